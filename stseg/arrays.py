@@ -57,9 +57,9 @@ class Boxes:
 
 
 Observation = Bytes | NDArray[np.uint16] | Singles | Boxes | None
-"""What one camera delivers for one frame: a colour image uint8 (v, u, 3), a mask uint8 (v, u), an instance image
+"""Data of one camera for one frame: a colour image uint8 (v, u, 3), a mask uint8 (v, u), an instance image
 uint16 (v, u), a foreground likelihood float32 (v, u), boxes, or None where it is blind."""
 
 ViewEvidence = Boxes | Singles | None
-"""What the foreground stage makes of an observation: boxes, a likelihood map float32 (v, u), or None where the view is
+"""Result of the foreground stage for an observation: boxes, a likelihood map float32 (v, u), or None where the view is
 blind."""

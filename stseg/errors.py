@@ -1,4 +1,4 @@
-"""What can go wrong, as a tree.
+"""Errors, as a tree.
 
     StsegError
     +-- InputError             what the user can mend: which place, which key, what was found, what was expected

@@ -72,12 +72,12 @@ LOG_ODDS = Field("log_odds", np.dtype("<f4"), AXES, "nat", "log-odds of a person
 LABEL = Field("label", np.dtype("<i4"), AXES, "", "track id; 0 is background")
 FRAME = Field("frame", np.dtype("<i8"), ("time",), "", "frame of the recording")
 VIEWS = Field("views", np.dtype("u1"), AXES[1:], "", "number of views that see the cell")
-STEP = 1 / 32
+LOG_ODDS_STEP = 1 / 32
 """Quantisation of log_odds, nats: finer digits are noise and would enlarge the file."""
 FIELDS = (*SCALES, LOG_ODDS, LABEL, FRAME, VIEWS)
 
 VolumeKind = Literal["all", "tracks", "none"]
-KEPT = get_args(VolumeKind)
+VOLUMES = get_args(VolumeKind)
 """Values of @kept of the occupancy: the whole volume, cells near tracks, or nothing."""
 
 ABOUT = {

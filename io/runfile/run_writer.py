@@ -41,7 +41,7 @@ class RunWriter:
     overwrite
         Whether an older file of that name may be replaced, at the end.
     kept
-        One of `stseg.io.runfile.layout.KEPT`: the part of the volume that is appended; the rest is NaN and background.
+        One of `stseg.io.runfile.layout.VOLUMES`: the part of the volume that is appended; the rest is NaN and background.
 
     Raises
     ------
@@ -86,7 +86,7 @@ class RunWriter:
         frames : int64 (time,)
             Their numbers in the recording, rising.
         log_odds : float32 (time, plane, y, x)
-            Nats, NaN where no view sees the cell; kept to `layout.STEP`.
+            Nats, NaN where no view sees the cell; kept to `layout.LOG_ODDS_STEP`.
         label : int32 (time, plane, y, x)
             Track ids, 0 for background.
         """
@@ -188,7 +188,7 @@ class RunWriter:
 def packed_volume(log_odds: Singles, label: Labels) -> tuple[PackedFrame, PackedFrame]:
     """The log-odds and labels (plane, y, x) of a frame as `RunWriter.append_frames` packs them."""
     finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
-    coarse = np.round(finite / np.float32(layout.STEP)) * np.float32(layout.STEP)
+    coarse = np.round(finite / np.float32(layout.LOG_ODDS_STEP)) * np.float32(layout.LOG_ODDS_STEP)
     whole = coarse.astype(layout.LOG_ODDS.dtype, copy=False), label.astype(layout.LABEL.dtype, copy=False)
     return packed_frame(whole[0]), packed_frame(whole[1])
 

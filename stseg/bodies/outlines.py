@@ -1,4 +1,4 @@
-"""Outlines of pillars on a raster: one span of columns a row, from the discs of `geometry.bodies`."""
+"""Outlines of pillars on a raster: one span of columns a row, from the discs of `stseg.bodies.pillars`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def outlines(
     shape
         Rows and columns of the raster.
     widths : float64 (n,), optional
-        Relative to the silhouette of `geometry.bodies`; 1 if not given.
+        Relative to the silhouette of `stseg.bodies.pillars`; 1 if not given.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def sums_inside(
     ground : float64 (person, pillar, 2)
         Their places, metres.
     heights, widths : float64 (person, pillar)
-        Metres, and beside the silhouette of `geometry.bodies`.
+        Metres, and beside the silhouette of `stseg.bodies.pillars`.
     values : float32 (v, u)
         On the raster.
     owner : int16 (v, u)

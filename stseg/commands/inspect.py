@@ -138,9 +138,9 @@ def _seen(shares: list[float]) -> list[str]:
 def _minutes(people: list[float]) -> str:
     if len(people) < 2:
         return ""
-    shown = " ".join(f"{count:.1f}" for count in people[:_MINUTES])
+    text_of_minutes = " ".join(f"{count:.1f}" for count in people[:_MINUTES])
     rest = "" if len(people) <= _MINUTES else f" ... ({len(people)} minutes)"
-    return f"; minute by minute {shown}{rest}"
+    return f"; minute by minute {text_of_minutes}{rest}"
 
 
 def _ghosts(overview: Overview) -> list[str]:
@@ -176,12 +176,12 @@ def _share(seconds: float, total: float) -> str:
 
 
 def _longest(overview: Overview) -> Table:
-    shown = overview.tracks[:_LONGEST]
-    title = f"the {len(shown)} longest of {len(overview.tracks)} tracks"
+    longest = overview.tracks[:_LONGEST]
+    title = f"the {len(longest)} longest of {len(overview.tracks)} tracks"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
     for heading in ("id", "frames", "first", "last", "seconds", "height m", "score"):
         table.add_column(heading, justify="right")
-    for track in shown:
+    for track in longest:
         seconds = f"{track['frames'] / overview.frame_rate:.1f}"
         numbers = (f"{track[name]:.0f}" for name in ("id", "frames", "first", "last"))
         table.add_row(*numbers, seconds, f"{track['height']:.2f}", f"{track['score']:.1f}")

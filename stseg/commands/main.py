@@ -103,7 +103,7 @@ def _run(tokens: list[str]) -> int:
         _drop_output()  # or Python would try once more to write it
         return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
     except Exception:
-        if not termination.asked:
+        if not termination.end_requested:
             raise
         print(termination.line, file=sys.stderr)  # the compiler has dropped the interrupt, and failed of it
         return termination.status

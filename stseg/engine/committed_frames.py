@@ -117,9 +117,9 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
     rows, parts, residuals, appearance, events = [], [], [], [], [commit.events]
     for fused in commit.frames:
-        explanation, fusion, own, of_views = records.pop(fused.frame)
+        explanation, fusion, rows_of_frame, of_views = records.pop(fused.frame)
         rates = fusion.result().rates
-        appearance.append(own)
+        appearance.append(rows_of_frame)
         events.append(of_views)
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):

@@ -84,17 +84,17 @@ class Tracker:
         place = f"frame {frame}"
         if frame < self._next:
             raise SourceError(place, "", f"a frame before frame {self._next}", "frames in the order of time")
-        seen = in_rig_order(self.rig, views, place)
+        observations = in_rig_order(self.rig, views, place)
         if self._session is None:
-            self._session, self._next = self._begin(seen, frame), frame
-        for camera, kind, view in zip(self.rig.cameras, self._kinds, seen, strict=True):
+            self._session, self._next = self._begin(observations, frame), frame
+        for camera, kind, view in zip(self.rig.cameras, self._kinds, observations, strict=True):
             if view is not None and _kind(view) != kind:
                 raise SourceError(place, f"camera {camera.name}", _kind(view), f"{kind}, as in the frames before")
         results = []
         for number in range(self._next, frame):
-            results += self._session.add(FrameSet(number, (None,) * len(seen)))
+            results += self._session.add(FrameSet(number, (None,) * len(observations)))
         self._next = frame + 1
-        reduced = tuple(reduced_view(view, factor) for view, factor in zip(seen, self._factors, strict=True))
+        reduced = tuple(reduced_view(view, factor) for view, factor in zip(observations, self._factors, strict=True))
         return results + self._session.add(FrameSet(frame, reduced))
 
     def finish(self) -> list[CommittedFrames]:
@@ -110,9 +110,9 @@ class Tracker:
         appearance: Rows = np.concatenate([np.zeros(0, APPEARANCE), *(result.appearance for result in results)])
         return self._session.pipeline.finished(rows, events, appearance, self.rig)[0]
 
-    def _begin(self, seen: Sequence[Observation], frame: int) -> Session:
+    def _begin(self, observations: Sequence[Observation], frame: int) -> Session:
         """The stages, for the kinds of the first observations; a blind camera is taken to be of the others' kind."""
-        found = [None if view is None else _kind(view) for view in seen]
+        found = [None if view is None else _kind(view) for view in observations]
         common = next((kind for kind in found if kind is not None), "masks")
         self._kinds = [kind or common for kind in found]
         rows, grid = self.config.foreground.body_rows, self.rig.grid

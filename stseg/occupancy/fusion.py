@@ -61,7 +61,7 @@ class FrameTerms(NamedTuple):
         a_i, 0..1: visible share of the footprint; of any value where the level is UNSEEN.
     near_person : int32 (n,)
         The person near each cell, -1 for none.
-    terms : float32 (view, 2, TOP + 1)
+    terms : float32 (view, 2, TOP_LEVEL + 1)
         The term of each level near no person, and within reach of a person, nats.
     weight : float32 (view,)
         1 / C_i, in any scale.
@@ -120,7 +120,7 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
 
     Returns
     -------
-    float32 (2, TOP + 1)
+    float32 (2, TOP_LEVEL + 1)
         Near no person, and within reach of a person.
     """
     likelihood = np.arange(TOP_LEVEL + 1) / TOP_LEVEL
@@ -131,7 +131,7 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
 
 
 def synergy_terms(floor: float) -> Singles:
-    """log max(L, floor) of each level, nats, float32 (2, TOP + 1): the same near people."""
+    """log max(L, floor) of each level, nats, float32 (2, TOP_LEVEL + 1): the same near people."""
     likelihood = np.arange(TOP_LEVEL + 1) / TOP_LEVEL
     return np.tile(np.log(np.maximum(likelihood, floor)).astype(np.float32), (2, 1))
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from stseg.engine.offline.named import rows_with_ids
 
 from stseg.arrays import Ints, Rows
-from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import associated_tracks
 from stseg.engine.recordings import run_of
 from stseg.errors import ConfigError, FormatError, InputError
@@ -151,20 +151,20 @@ def _require_obeyed(constraints: Constraints, places: Sequence[str], identity: I
 
 def _numbers(old: Rows, identity: Ints, others: Ints) -> dict[int, int]:
     """The run's id for each identity: that of the first row that has one, a new one where it is taken."""
-    fresh, numbers, taken = int(old["id"].max(initial=0)), dict[int, int](), set[int]()
+    last_id, numbers, used_ids = int(old["id"].max(initial=0)), dict[int, int](), set[int]()
     order = np.lexsort((old["id"], old["frame"]))
     named = order[(identity[order] > 0) & (old["id"][order] > 0)]
     for row in [*named.tolist(), *order.tolist()]:
-        one, own = int(identity[row]), int(old["id"][row])
+        one, earlier_id = int(identity[row]), int(old["id"][row])
         if one > 0 and one not in numbers:
-            if own == 0 or own in taken:
-                fresh, own = fresh + 1, fresh + 1
-            numbers[one] = own
-            taken.add(own)
+            if earlier_id == 0 or earlier_id in used_ids:
+                last_id, earlier_id = last_id + 1, last_id + 1
+            numbers[one] = earlier_id
+            used_ids.add(earlier_id)
     for one in np.unique(others[others > 0]).tolist():
         if one not in numbers:
-            fresh += 1
-            numbers[one] = fresh
+            last_id += 1
+            numbers[one] = last_id
     return numbers
 
 
@@ -177,16 +177,16 @@ def _numbered(rows: Rows, numbers: dict[int, int]) -> Rows:
 
 
 def _label_ids(old: Rows, new: Ints) -> Callable[[Ints, Ints], Ints]:
-    known = np.flatnonzero(old["id"] > 0)
+    named = np.flatnonzero(old["id"] > 0)
     span = int(old["frame"].max(initial=0)) + 1
-    key = old["id"][known] * span + old["frame"][known]
+    key = old["id"][named] * span + old["frame"][named]
     order = np.argsort(key)
-    key, value = key[order], new[known[order]]
+    key, value = key[order], new[named[order]]
 
     def new_ids(identity: Ints, frame: Ints) -> Ints:
-        asked = identity * span + np.minimum(frame, span - 1)
-        index = np.searchsorted(key, asked).clip(max=max(len(key) - 1, 0))
-        return np.where(key[index] == asked, value[index], 0) if len(key) else np.zeros(len(identity), np.int64)
+        keys = identity * span + np.minimum(frame, span - 1)
+        index = np.searchsorted(key, keys).clip(max=max(len(key) - 1, 0))
+        return np.where(key[index] == keys, value[index], 0) if len(key) else np.zeros(len(identity), np.int64)
 
     return new_ids
 
@@ -195,9 +195,9 @@ def _names(old: Rows, new: Ints, names: dict[int, str]) -> dict[int, str]:
     """Names by corrected id: that of the first row of the track that was named."""
     found = dict[int, str]()
     for identity, name in names.items():
-        own = np.flatnonzero((old["id"] == identity) & (new > 0))
-        if len(own):
-            found[int(new[own[np.argmin(old["frame"][own])]])] = name
+        rows = np.flatnonzero((old["id"] == identity) & (new > 0))
+        if len(rows):
+            found[int(new[rows[np.argmin(old["frame"][rows])]])] = name
     return found
 
 

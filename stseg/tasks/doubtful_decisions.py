@@ -21,7 +21,7 @@ _AROUND = 10.0
 """Time before and after a decision in which identities are solved with it, and with the opposite one, seconds."""
 _HYPOTHESES = 50
 """Hypotheses of these searches."""
-_MOST = 300
+_WEIGHED_DECISIONS = 300
 """Decisions that are weighed so, those with the least margins by heights and motion alone; the others come after."""
 
 
@@ -34,8 +34,8 @@ def doubtful_decisions(run: Run) -> list[Doubt]:
     found = find_doubts(run.trajectory, run.tracks, run.frame_rate, border)
     if not is_solved_again(run):
         return found
-    weighed = sorted(_weighed(run, found[:_MOST]), key=lambda one: (one.margin, one.first, one.track))
-    return weighed + found[_MOST:]
+    weighed = sorted(_weighed(run, found[:_WEIGHED_DECISIONS]), key=lambda one: (one.margin, one.first, one.track))
+    return weighed + found[_WEIGHED_DECISIONS:]
 
 
 def _weighed(run: Run, doubts: Sequence[Doubt]) -> list[Doubt]:

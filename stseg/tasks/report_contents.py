@@ -50,8 +50,8 @@ def page_contents(
     rig, trajectory = run.recording.rig, run.trajectory
     span, ghosts, bins = _span(run), ghost_reasons(run.ghosts), Bins.of(rig.grid)
     places, shares = dwell_places(trajectory, bins), ground_by_views(run.views, rig.grid.inside(), len(run.cameras))
-    shown = np.array([instant.frame for instant in instants], np.int64)
-    sheets = thin_sheets(run.frames, rig.grid, run.read_frame, _SHEETS, shown)
+    frames_shown = np.array([instant.frame for instant in instants], np.int64)
+    sheets = thin_sheets(run.frames, rig.grid, run.read_frame, _SHEETS, frames_shown)
     plan, thread = ground_figures(rig, run.views, trajectory, truth, run.names)
     counts = (len(run.frames), trajectory, run.tracks, run.events, len(run.ghosts))
     return Contents(
@@ -153,9 +153,9 @@ def _busy_figures(run: Run, span: Span) -> list[Figure]:
         return []
     rig, trajectory, figures = run.recording.rig, run.trajectory, []
     for number, minute in enumerate(busiest_minutes(span, trajectory), 1):
-        own = trajectory[(trajectory["frame"] >= minute.first) & (trajectory["frame"] < minute.stop)]
+        rows_of_minute = trajectory[(trajectory["frame"] >= minute.first) & (trajectory["frame"] < minute.stop)]
         since = clock_time(minute.first / span.frame_rate)
-        picture = plan_view(rig, own, title=f"from {since}", width=640, height=680, names=run.names)
+        picture = plan_view(rig, rows_of_minute, title=f"from {since}", width=640, height=680, names=run.names)
         words = f"The minute from {since}: {minute.mean:.1f} people at a time, at most {minute.most}."
         figures.append(Figure(f"busy{number}", picture, words))
     return figures
@@ -171,8 +171,8 @@ def _view_summaries(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:
     rig, parts = run.recording.rig, np.nan_to_num(run.ghosts["parts"][run.ghosts["status"] == 1])
     view_summaries = []
     for view, camera in enumerate(rig.cameras):
-        own = parts[:, view][has_evidence(parts[:, view])]
-        nats = float(np.median(own)) if len(own) else float("nan")
+        evidence = parts[:, view][has_evidence(parts[:, view])]
+        nats = float(np.median(evidence)) if len(evidence) else float("nan")
         denied = int(ghosts.denies[:, view].sum())
         view_summaries.append(ViewSummary(camera.name, _ground_seen(camera, rig.grid), denied, nats))
     return view_summaries
@@ -181,8 +181,8 @@ def _view_summaries(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:
 def _ground_seen(camera: Camera, grid: Grid) -> float:
     """Share of the ground that counts over which the camera sees some plane."""
     ground = grid.ground[grid.inside()]
-    seen = np.zeros(len(ground), bool)
+    visible = np.zeros(len(ground), bool)
     for height in grid.heights.tolist():
         pixel, ahead = camera.project(ground, height)
-        seen |= ahead & camera.inside(pixel)
-    return float(seen.mean()) if len(seen) else 0.0
+        visible |= ahead & camera.inside(pixel)
+    return float(visible.mean()) if len(visible) else 0.0

@@ -55,8 +55,8 @@ def _question(run: Run, doubt: Doubt, views: Mapping[int, tuple[Observation, ...
     rig, ids = run.recording.rig, [one for one in (doubt.track, doubt.other) if one]
     moments, unseen = _moments(run, doubt), (None,) * len(run.cameras)
     rows = run.trajectory[np.isin(run.trajectory["id"], ids)]
-    shown = rows[(rows["frame"] >= moments[0][1]) & (rows["frame"] <= moments[2][1])]
-    ground = np.array([[part["x"].mean(), part["y"].mean()] for k in ids if len(part := shown[shown["id"] == k])])
+    nearby = rows[(rows["frame"] >= moments[0][1]) & (rows["frame"] <= moments[2][1])]
+    ground = np.array([[part["x"].mean(), part["y"].mean()] for k in ids if len(part := nearby[nearby["id"] == k])])
     pictures = [
         (
             f"{words}, frame {frame}, {run.cameras[view]}",

@@ -98,8 +98,8 @@ def simulate(
 def _named(name: str) -> SceneSpec:
     if name in NAMED:
         return NAMED[name]
-    near = difflib.get_close_matches(name, NAMED, n=1)
-    suggestion = f"; did you mean {near[0]}?" if near else ""
+    similar = difflib.get_close_matches(name, NAMED, n=1)
+    suggestion = f"; did you mean {similar[0]}?" if similar else ""
     raise ConfigError("command line", "--scene", repr(name), f"one of {', '.join(NAMED)}{suggestion}")
 
 

@@ -71,24 +71,24 @@ def _frame(run: Run, wanted: dict[str, str], text: str) -> int:
         raise ConfigError("command line", "--slice", repr(text), "a run with frames: this one is empty")
     first, last = int(run.frames[0]), int(run.frames[-1])
     if "frame" in wanted:
-        asked = _number("frame", wanted["frame"])
-        if asked not in run.frames:
+        requested = _number("frame", wanted["frame"])
+        if requested not in run.frames:
             raise ConfigError(
                 "command line", "--slice frame", wanted["frame"], f"a frame of the run, {first} to {last}"
             )
-        return int(asked)
-    asked = _number("t", wanted["t"]) * run.frame_rate
-    nearest = int(run.frames[np.abs(run.frames - asked).argmin()]) if np.isfinite(asked) else first
-    if not abs(nearest - asked) <= 0.5 + 1e-6:
+        return int(requested)
+    requested = _number("t", wanted["t"]) * run.frame_rate
+    nearest = int(run.frames[np.abs(run.frames - requested).argmin()]) if np.isfinite(requested) else first
+    if not abs(nearest - requested) <= 0.5 + 1e-6:
         span = f"seconds of the run, {first / run.frame_rate:g} to {last / run.frame_rate:g}"
         raise ConfigError("command line", "--slice t", wanted["t"], span)
     return nearest
 
 
 def _plane(heights: Floats, text: str) -> int:
-    asked = _number("plane", text)
+    requested = _number("plane", text)
     step = float(np.diff(heights).max(initial=0.0))
-    nearest = int(np.abs(heights - asked).argmin()) if np.isfinite(asked) else 0
-    if not abs(heights[nearest] - asked) <= step / 2 + 1e-6:
+    nearest = int(np.abs(heights - requested).argmin()) if np.isfinite(requested) else 0
+    if not abs(heights[nearest] - requested) <= step / 2 + 1e-6:
         raise ConfigError("command line", "--slice plane", text, f"a height in metres, 0 to {heights[-1]:g}, or all")
     return nearest

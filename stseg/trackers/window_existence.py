@@ -22,7 +22,7 @@ from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.filter.prediction import DetectionHistory
 
 _LEAST_LOG_ODDS = 12.0
-"""Of people that the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""
+"""Least log-odds of people that the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""
 _FIRST_NUMBER = 1 << 30
 """First number of their tracks: those of the filter count from 1."""
 

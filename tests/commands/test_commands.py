@@ -143,7 +143,7 @@ def test_inspect_sums_up_a_run(run_path: Path) -> None:
     assert overview.warnings == ["view right has no evidence on any candidate: is it blind, or its calibration wrong?"]
 
 
-def test_inspect_counts_people_by_the_minute_and_says_why_ghosts_were_dropped(run_path: Path) -> None:
+def test_inspect_counts_people_and_explains_ghosts(run_path: Path) -> None:
     overview = summarise_run(read_run(run_path))
     assert overview.people_per_minute == [1.5]
     assert overview.track_seconds == pytest.approx({"shortest": 0.6, "median": 0.9, "longest": 1.2})

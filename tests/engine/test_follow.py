@@ -238,7 +238,7 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
 
 
 @quick
-def test_without_an_empty_scene_it_learns_first_and_loses_nothing(
+def test_without_an_empty_scene_no_frame_is_lost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"

@@ -173,7 +173,7 @@ def test_parts_of_a_later_clock_are_removed(tmp_path: Path) -> None:
 
 
 @COMPILED
-def test_a_clock_set_back_between_kill_and_resume_changes_nothing(tmp_path: Path) -> None:
+def test_a_clock_set_back_before_a_resume_changes_nothing(tmp_path: Path) -> None:
     (tmp_path / "whole").mkdir()
     rig, night = write_recording(tmp_path), tmp_path / "night.h5"
     assert track(rig, tmp_path / "whole" / "run.h5") == 0

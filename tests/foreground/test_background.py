@@ -72,7 +72,7 @@ def in_shadow(share: float) -> tuple[float, float, float]:
 
 
 @every_model
-def test_the_likelihood_is_a_posterior_with_the_prior_that_is_told(kind: type[PixelModel]) -> None:
+def test_the_likelihood_is_a_posterior_with_the_given_prior(kind: type[PixelModel]) -> None:
     model: Background = taught(kind, foreground_prior=0.2)
     assert model.prior == 0.2
     likelihood = model.likelihood(with_person(room()))
@@ -114,7 +114,7 @@ def test_a_part_of_the_scene_may_change_slowly(kind: type[PixelModel]) -> None:
 
 
 @every_model
-def test_a_chair_that_moved_in_becomes_background_after_the_absorption(kind: type[PixelModel]) -> None:
+def test_a_chair_becomes_background_after_the_absorption(kind: type[PixelModel]) -> None:
     model, rng = taught(kind, absorption_time=20.0, smoothing_radius=0), np.random.default_rng(6)
     chair = with_person(room())
     answers = [float(model.likelihood(noisy(chair, rng))[MIDDLE]) for _ in range(int(24 * RATE))]
@@ -246,7 +246,7 @@ def test_constants_out_of_range_are_named(config: type[Any], key: str, value: fl
 
 
 @given(seed=st.integers(0, 10**6))
-def test_the_distance_from_the_ray_is_the_mahalanobis_distance_in_the_chromatic_plane(seed: int) -> None:
+def test_the_chromatic_distance_is_mahalanobis(seed: int) -> None:
     rng = np.random.default_rng(seed)
     x, mu, sigma = rng.uniform(1, 255, 3), rng.uniform(1, 255, 3), 3.0
     plane = mu / mu.sum()
@@ -256,7 +256,7 @@ def test_the_distance_from_the_ray_is_the_mahalanobis_distance_in_the_chromatic_
     assert np.sqrt(squared) == pytest.approx(reference.polar(x, mu)[1] / sigma, rel=1e-5, abs=1e-6)
 
 
-def test_where_light_flickers_a_person_as_bright_as_the_wall_is_found_by_colour() -> None:
+def test_in_flickering_light_people_are_found_by_colour() -> None:
     rng = np.random.default_rng(9)
     models = [new(Mixture, smoothing_radius=0), new(Chromatic, smoothing_radius=0)]
     for _ in range(40):
@@ -360,7 +360,7 @@ def test_what_was_learned_first_is_never_forgotten() -> None:
     assert model.likelihood(with_person(room()))[MIDDLE] > 0.9  # somebody like the chair, after it is gone
 
 
-def test_among_people_a_second_colour_is_background_where_it_keeps_coming() -> None:
+def test_a_recurring_second_colour_is_background() -> None:
     lamp = (90, 200, 240)
     for colours, likely in (([0, 1] * 10, False), ([1, 1, 1, 0, 0, 0, 0, 0, 0, 0] * 2, True)):
         model = new(Codebook)

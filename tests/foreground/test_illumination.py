@@ -165,7 +165,7 @@ def test_nothing_to_ask_is_no_light() -> None:
     np.testing.assert_allclose(field, 1)
 
 
-def test_only_what_stands_still_in_its_own_colour_is_taken_in_a_new_light() -> None:
+def test_only_still_colours_are_learned_in_a_new_light() -> None:
     rng = np.random.default_rng(6)
     lit = np.where(U < 32, 1.6, 1.0)
     frames = np.stack([shot(lit, body(frame), rng) for frame in range(9)])

@@ -42,7 +42,7 @@ def test_each_kind_of_observation_has_its_evidence() -> None:
 
 
 @pytest.mark.parametrize("model", ["mixture", "chromatic", "codebook"])
-def test_colour_is_judged_by_the_background_with_the_prior_taken_out(model: Any) -> None:
+def test_the_prior_is_taken_out_of_colour_likelihoods(model: Any) -> None:
     empty = np.full((12, 16, 3), 120, np.uint8)
     models = [make_background((16, 12), 10.0, ForegroundConfig(model=model)) for _ in range(2)]
     for background in models:
@@ -63,7 +63,7 @@ def test_a_colour_frame_without_a_background_is_refused() -> None:
         ViewForeground().evidence(np.zeros((4, 4, 3), np.uint8))
 
 
-def test_pixels_are_those_of_the_evidence_and_instances_are_certain() -> None:
+def test_instances_are_certain_pixels() -> None:
     sight = ViewForeground()
     assert sight.pixels(None) is None
     assert sight.pixels(Boxes(np.zeros((0, 4)), np.zeros(0))) is None

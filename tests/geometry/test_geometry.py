@@ -54,7 +54,7 @@ def test_single_points_are_projected_alike(camera: Camera, ground: Floats, heigh
             np.testing.assert_allclose(found, pixel, rtol=1e-9, atol=1e-9)
 
 
-def test_a_rational_lens_bends_single_points_alike_and_nothing_is_seen_behind() -> None:
+def test_a_rational_lens_distorts_points_one_by_one() -> None:
     lens = Lens(MATRIX, np.array([0.4, 0.1, 0.002, -0.003, 0.01, 0.6, 0.2, 0.02]))
     camera = Camera.from_projection("cam", (640, 480), LEVEL, lens)
     expected, _ = camera.project(np.array([0.4, 3.0]), 1.0)

@@ -27,7 +27,7 @@ GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
 
 @pytest.mark.parametrize("distortion", [None, BARREL])
 @given(x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(0, 2), factor=st.integers(1, 6))
-def test_a_reduced_view_shows_each_point_in_the_square_that_holds_it(
+def test_a_reduced_view_shows_each_point_in_its_square(
     distortion: tuple[float, ...] | None, x: float, y: float, height: float, factor: int
 ) -> None:
     camera = looking("west", (-4.5, -3.0, 2.6), size=(640, 480), focal=500.0, distortion=distortion)

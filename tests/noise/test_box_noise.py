@@ -21,7 +21,7 @@ RATE = 5.0
 CONFIG = ErrorRateConfig(memory=1e6, prior_weight=2.0)
 
 
-def test_a_sure_box_has_the_first_tolerance_and_others_the_logarithm_of_their_score() -> None:
+def test_tolerance_of_boxes_follows_their_score() -> None:
     tolerance, belief = PRIOR_NOISE.of(np.array([1.0, 0.6, 0.2]))
     np.testing.assert_allclose(tolerance[0], TOLERANCE)
     np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
@@ -37,7 +37,7 @@ def test_what_is_sharper_says_more(scores: list[float]) -> None:
     np.testing.assert_allclose(more - belief, 4 * EFFECTIVE_OBSERVATIONS * np.log(2))
 
 
-def test_nothing_seen_is_the_first_guess_and_what_is_seen_is_forgotten() -> None:
+def test_noise_begins_at_the_prior_and_forgets() -> None:
     sharpening = BoxNoiseEstimate(RATE, replace(CONFIG, memory=1.0))
     np.testing.assert_allclose(sharpening.noise.spread, PRIOR_NOISE.spread)
     taught(sharpening, 0.01, 1.0, 20)

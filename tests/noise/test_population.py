@@ -72,7 +72,7 @@ def test_people_alike_leave_the_least_spread_and_are_forgotten() -> None:
     assert learned([*small, *[sized([], [])] * 400], config).height_mean == pytest.approx(1.7, abs=1e-3)
 
 
-def test_a_run_among_children_learns_it_and_one_among_adults_does_not() -> None:
+def test_a_run_among_children_learns_their_height() -> None:
     rig = room()
     standing = {"children": [(-0.9, 0.4, 1.2), (0.6, -0.5, 1.15)], "adults": [(-0.9, 0.4, 1.72), (0.6, -0.5, 1.68)]}
     means = {}
@@ -114,7 +114,7 @@ def test_the_rigs_bodies_are_checked(line: str, key: str) -> None:
         parse_rig(text, Path("rig.toml"))
 
 
-def test_the_rig_sets_the_prior_and_the_configuration_counts_before_it() -> None:
+def test_the_configuration_precedes_the_rig_as_a_prior() -> None:
     dogs = recording(BodyPrior(height_mean=0.6, width_mean=0.5))
     assert with_body_of(recording(BodyPrior()), Config()) == Config()
     body = with_body_of(dogs, Config()).body

@@ -86,7 +86,7 @@ def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
     assert (learned_from(eaten, alone).shares.sums[:, 1] > 1.5 * learned_from(shifted, alone).shares.sums[:, 1]).all()
 
 
-def test_a_view_that_has_seen_nobody_takes_the_mean_of_the_others() -> None:
+def test_a_view_without_people_takes_the_mean_of_the_others() -> None:
     rims = learned(people(*APART), 3)
     every = rims.withdrawn
     rims.shares.sums[2] = 0.0
@@ -101,7 +101,7 @@ def test_who_overlaps_or_is_doubted_teaches_nothing(standing: list[tuple[float, 
     np.testing.assert_array_equal(learned(people(*standing), 3, evidence=evidence).shares.sums, 0.0)
 
 
-def test_people_in_eaten_silhouettes_are_surer_once_rims_are_known() -> None:
+def test_learned_rims_raise_evidence_in_eaten_silhouettes() -> None:
     standing = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
     asked, evidence = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY), []
     first = asked.new_estimates()

@@ -70,7 +70,7 @@ def test_a_pixel_of_one_person_alone_says_nothing() -> None:
     assert np.allclose(found[0, :, :2], 0, atol=1e-6)
 
 
-def test_colours_are_learned_from_pixels_that_are_sure_and_shrunk_to_those_of_all() -> None:
+def test_colours_are_learned_from_certain_pixels() -> None:
     rng = np.random.default_rng(2)
     likelihood, rows, image = two_rectangles(rng)
     sure = likelihood.people.share >= 0.9

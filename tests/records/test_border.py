@@ -8,7 +8,7 @@ from scenes import room
 from stseg.records.border import Border
 
 
-def test_points_have_the_distance_of_their_cell_and_none_beyond_the_ground() -> None:
+def test_points_have_the_distance_of_their_cell() -> None:
     border = Border.of(room())
     grid, (rows, columns) = border.grid, border.distance.shape
     ground = grid.ground.reshape(-1, 2) + np.random.default_rng(0).uniform(-0.49, 0.49, (rows * columns, 2)) * grid.cell

@@ -83,7 +83,7 @@ def test_a_view_is_not_silent_where_no_person_was_present() -> None:
     assert view_warnings(("a", "b"), people_in(frames, 3.0, 3.0), FRAMES, 5.0) == []
 
 
-def test_a_detector_with_little_evidence_of_the_occluded_denies_none() -> None:
+def test_little_evidence_of_the_occluded_denies_none() -> None:
     hidden = np.where(FRAMES % 3 == 0, 2.5, -0.016)
     assert view_warnings(("a", "b"), people_in(FRAMES, 3.0, hidden), FRAMES, 5.0) == []
 

@@ -102,7 +102,7 @@ CORNER = {"dilation": 4.0, "holes": 4.0, "rain": 4.0}
 
 
 @pytest.mark.parametrize("kind", CORNER)
-def test_a_small_crowd_is_tracked_through_errors_of_middle_strength(kind: str) -> None:
+def test_a_small_crowd_is_tracked_through_middle_errors(kind: str) -> None:
     spec = replace(NAMED["demo"], people=3, seconds=1.5)
     film = SpoiledFilm(SceneFilm(spec), [Spoil(kind, STRENGTHS[kind][1])])
     tracker, results, truth = Tracker(film.rig), [], []

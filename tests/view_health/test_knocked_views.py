@@ -125,7 +125,7 @@ def as_mask(likelihood: Floats) -> Bytes:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_run_by_three_views_says_from_when_to_when_one_is_knocked(kind: str) -> None:
+def test_a_run_says_when_one_of_three_views_is_knocked(kind: str) -> None:
     rig = replace(room(), frame_rate=RATE, cameras=room().cameras[:3])
     tracker, results = Tracker(rig), []
     for frame in range(40):

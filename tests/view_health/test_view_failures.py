@@ -23,7 +23,7 @@ FAILED = 2
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))
-def test_informedness_is_the_share_of_bodies_less_that_of_the_rest(seed: int, number: int) -> None:
+def test_informedness_by_its_formula(seed: int, number: int) -> None:
     rng = np.random.default_rng(seed)
     assignment = rng.integers(-1, number, (9, 11)).astype(np.int16)
     sure, foreground = rng.random(number) < 0.6, rng.random((9, 11)) < 0.5
@@ -76,7 +76,7 @@ def test_a_view_that_fails_is_left_out_and_counts_again(kind: str, failure: str)
     assert not learned.failures.failing.any()
 
 
-def test_a_view_that_fails_for_long_counts_again_once_nobody_is_there() -> None:
+def test_a_failed_view_counts_again_in_an_empty_scene() -> None:
     (asked, learned), seen = session("pixels"), shown("pixels")
     explained(asked, learned, seen, 10)
     explained(asked, learned, failed("pixels", "black", seen), 40)
@@ -92,7 +92,7 @@ def test_a_view_that_never_showed_people_does_not_fail() -> None:
 
 
 @pytest.mark.parametrize(("others", "failing"), [(3, False), (4, True)])
-def test_beside_four_sound_views_one_that_never_showed_people_fails(others: int, failing: bool) -> None:
+def test_a_view_that_never_showed_people_fails_beside_four(others: int, failing: bool) -> None:
     corner, *more = room().cameras
     rig = rig_of([corner, *more, looking("beside", (0.0, -3.6, 2.6))][: others + 1])
     asked = Detector(replace(rig, frame_rate=RATE), ["pixels"] * len(rig.cameras), FEW_HEIGHTS, BODY)

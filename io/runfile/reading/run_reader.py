@@ -340,8 +340,8 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
     checks.require_rising(frames)
     for name, axis in (("plane", heights), ("y", ground_y), ("x", ground_x)):
         checks.require_finite(f"{layout.OCCUPANCY}/{name}", axis)
-    kept = read_attribute(group, "kept") if "kept" in group.attrs else layout.KEPT[0]
-    if kept not in layout.KEPT:
-        raise FormatError(path, f"{layout.OCCUPANCY}@kept", abbreviated(kept), f"one of {', '.join(layout.KEPT)}")
+    kept = read_attribute(group, "kept") if "kept" in group.attrs else layout.VOLUMES[0]
+    if kept not in layout.VOLUMES:
+        raise FormatError(path, f"{layout.OCCUPANCY}@kept", abbreviated(kept), f"one of {', '.join(layout.VOLUMES)}")
     title = printable(str(read_texts(entry)))[: limits.NAME]
     return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))

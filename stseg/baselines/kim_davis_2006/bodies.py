@@ -27,7 +27,7 @@ HALF_WIDTH = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, PROFILE[:, 0], PROF
 """W by relative height, float64 (level,)."""
 LOOSENESS = 0.025
 """Scale of the logistic distribution of W: clothes, strides, and the error of a foreground's edge."""
-REACH = 6 * LOOSENESS + float(HALF_WIDTH.max())
+MARGIN = 6 * LOOSENESS + float(HALF_WIDTH.max())
 """Greatest distance of a body pixel from the axis, relative to its length."""
 
 
@@ -85,7 +85,7 @@ def fill_boxes(ideal: Singles, bodies: Floats, margin: Floats, boxes: Ints) -> N
     ideal : float32 (v, u, 2)
         Undistorted coordinates of each pixel of the raster.
     margin : float64 (n,)
-        Search margin beyond REACH, relative to the body's length.
+        Search margin beyond MARGIN, relative to the body's length.
     """
     for k in range(len(bodies)):
         boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = ideal.shape[0], 0, ideal.shape[1], 0
@@ -94,6 +94,6 @@ def fill_boxes(ideal: Singles, bodies: Floats, margin: Floats, boxes: Ints) -> N
         for v in range(ideal.shape[0]):
             for u in range(ideal.shape[1]):
                 along, across = placed(bodies[k], ideal[v, u, 0], ideal[v, u, 1])
-                if across < REACH + margin[k] and -REACH - margin[k] < along < 1.0 + REACH + margin[k]:
+                if across < MARGIN + margin[k] and -MARGIN - margin[k] < along < 1.0 + MARGIN + margin[k]:
                     boxes[k, 0], boxes[k, 1] = min(boxes[k, 0], v), max(boxes[k, 1], v + 1)
                     boxes[k, 2], boxes[k, 3] = min(boxes[k, 2], u), max(boxes[k, 3], u + 1)

@@ -18,7 +18,7 @@ from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
 from stseg.io.recording.video.video_size import read_video_size
 
-_UNKNOWN = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
+_UNIT_CAMERA = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _WORTH = 0.02
 """Mean movement of the corners that makes a view a new one, in image widths."""
 
@@ -62,7 +62,7 @@ def calibrate_lens(
             "--board, --every, --square", "", f"{board}, {every}, {square:g}", "3 or more; 1 or more; above 0"
         )
     size = read_video_size(video)
-    stream = open_stream(Source("video", video), Camera.from_projection(video.stem, size, _UNKNOWN))
+    stream = open_stream(Source("video", video), Camera.from_projection(video.stem, size, _UNIT_CAMERA))
     found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []
     try:
         while isinstance(view := stream.read(), np.ndarray):

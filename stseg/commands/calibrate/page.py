@@ -21,7 +21,7 @@ from stseg.io.recording.streams import open_stream
 from stseg.io.recording.video.video_size import read_video_size
 from stseg.reporting.page.calibration_page import FloorPlan, calibration_page
 
-_UNKNOWN = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
+_UNIT_CAMERA = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 """A projection that stands for a camera's own until points are clicked."""
 
 
@@ -73,7 +73,7 @@ def _frame(path: Path, number: int) -> Bytes:
     """A colour frame of a video, or a picture."""
     if is_image_source(path):
         return read_colour(path)
-    camera = Camera.from_projection(path.stem, read_video_size(path), _UNKNOWN)
+    camera = Camera.from_projection(path.stem, read_video_size(path), _UNIT_CAMERA)
     stream = open_stream(Source("video", path), camera)
     try:
         view = stream.read() if stream.skip(number) == number else None

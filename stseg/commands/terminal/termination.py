@@ -44,7 +44,7 @@ class Termination:
             sys.unraisablehook = self._repeat_interrupt
 
     @property
-    def asked(self) -> bool:
+    def end_requested(self) -> bool:
         """Whether the command was asked to end."""
         return self._number is not None
 

@@ -155,8 +155,8 @@ def _append_labels(part: _SegmentRows, writer: RunWriter, packers: Executor) -> 
     rows, identity = part.rows[order], part.identity[order]
 
     def renamed(frame: int, label: PackedFrame) -> PackedFrame:
-        own = slice(*rows["frame"].searchsorted([frame, frame + 1]))
-        return _renamed(label, part.run.views.shape, rows[own], identity[own])
+        of_frame = slice(*rows["frame"].searchsorted([frame, frame + 1]))
+        return _renamed(label, part.run.views.shape, rows[of_frame], identity[of_frame])
 
     for frames, label in part.run.read_packed_frames(layout.LABEL, _BLOCK):
         writer.append_packed_labels(list(packers.map(renamed, frames.tolist(), label)))

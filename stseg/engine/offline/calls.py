@@ -46,14 +46,14 @@ def called_beside(
 
     `note` is called with lines about the work, once the result is waited for.
     """
-    own, other = CONTEXT.Pipe(duplex=False)
+    receiver, other = CONTEXT.Pipe(duplex=False)
     process = CONTEXT.Process(target=_answer, args=(other, function, arguments), daemon=True)
     process.start()
     other.close()
 
     def result() -> _Result:
         try:
-            while isinstance(answer := own.recv(), _Note):
+            while isinstance(answer := receiver.recv(), _Note):
                 note(answer.text)
         except EOFError:
             return function(*arguments)
@@ -66,7 +66,7 @@ def called_beside(
     finally:
         process.kill()
         process.join()
-        own.close()
+        receiver.close()
 
 
 def _answer(pipe: Connection, function: Callable[..., object], arguments: tuple[object, ...]) -> None:

@@ -14,7 +14,7 @@ from stseg.identities.evidence.returns import known_people
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.untrusted import limits
 
-_MOST = limits.FRAMES // 2
+_LAST_ID = limits.FRAMES // 2
 """Greatest id of a known person."""
 _PLACE = [("frame", "<i8"), ("raw_x", "<f8"), ("raw_y", "<f8")]
 
@@ -35,11 +35,13 @@ def read_known(path: Path, config: Config) -> Rows:
     run = read_run(path)
     if not len(run.committed):
         raise FormatError(path, "/committed", "no rows", "those of a run of the tracker cut or frames")
-    own = known_people(rows_with_ids(run), run.appearance)
-    earlier = run.known_people[~np.isin(run.known_people["id"], own["id"])]
-    people = np.concatenate([earlier, own])
-    if (greatest := people["id"].max(initial=0)) > _MOST:
-        raise FormatError(path, "/tracks, id", str(greatest), f"ids up to {_MOST}, so that there are some for others")
+    people_of_run = known_people(rows_with_ids(run), run.appearance)
+    earlier = run.known_people[~np.isin(run.known_people["id"], people_of_run["id"])]
+    people = np.concatenate([earlier, people_of_run])
+    if (greatest := people["id"].max(initial=0)) > _LAST_ID:
+        raise FormatError(
+            path, "/tracks, id", str(greatest), f"ids up to {_LAST_ID}, so that there are some for others"
+        )
     return people
 
 
@@ -61,6 +63,6 @@ def _places(table: Rows) -> Rows:
     return places
 
 
-def digest(known: Rows) -> str:
+def digest(people: Rows) -> str:
     """Digest of known people, in words."""
-    return f"{len(known)} people, {blake2b(known.tobytes(), digest_size=8).hexdigest()}"
+    return f"{len(people)} people, {blake2b(people.tobytes(), digest_size=8).hexdigest()}"

@@ -73,19 +73,19 @@ def longest_absence(config: TrackingConfig) -> float:
     return max(config.patience, config.maximum_gap, config.interpolation_gap)
 
 
-def find_gaps(seen: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
+def find_gaps(covered: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
     """Gaps of a recording: half-open ranges of frames in which all cameras are blind.
 
     Parameters
     ----------
-    seen : bool (camera, frame)
+    covered : bool (camera, frame)
         Frames in which each camera has an image.
     first, stop
         The frames of the run, half open.
     longest
         Greatest length of an interruption that is not a gap, frames.
     """
-    blind = np.concatenate([[False], ~seen[:, first:stop].any(axis=0), [False]])
+    blind = np.concatenate([[False], ~covered[:, first:stop].any(axis=0), [False]])
     edges = first + np.flatnonzero(np.diff(blind.astype(np.int8)))
     return [(begin, end) for begin, end in edges.reshape(-1, 2).tolist() if end - begin > longest]
 

@@ -163,11 +163,11 @@ def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
 
 def _start(job: Job, cores: int) -> _Worker:
     """Start a worker process."""
-    own, other = CONTEXT.Pipe()
+    pipe, other = CONTEXT.Pipe()
     process = CONTEXT.Process(target=_main, args=(job, cores, other), daemon=True)
     process.start()
     other.close()
-    return _Worker(process, own, cores)
+    return _Worker(process, pipe, cores)
 
 
 class _Orders:

@@ -38,7 +38,7 @@ class Part:
 
     name: str
     ends: tuple[str, str]
-    aside: float
+    sideways: float
     ahead: float
     stretch: float = 1.2
 
@@ -123,7 +123,7 @@ def _ellipsoids(low: Floats, high: Floats, build: Floats) -> tuple[Floats, Float
     sideways = left - (along @ left)[..., None] * along
     sideways /= np.linalg.norm(sideways, axis=-1, keepdims=True)
     ahead = np.cross(sideways, along)
-    wide = build[:, None, None] * np.array([[part.aside, part.ahead] for part in PARTS])
+    wide = build[:, None, None] * np.array([[part.sideways, part.ahead] for part in PARTS])
     half = length * 0.5 * np.array([part.stretch for part in PARTS])[:, None]
     return 0.5 * (low + high), np.stack([ahead * wide[..., 1:], sideways * wide[..., :1], along * half], axis=2)
 

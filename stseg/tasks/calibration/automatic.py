@@ -122,7 +122,7 @@ def calibrate_auto(
     require_new(output, overwrite)
     streams = _streams(paths, output, frame_rate, background, source_kind)
     names = [camera.name for camera in streams.rig.cameras]
-    known = None if distance is None else _known_distance(distance, names)
+    stated_distance = None if distance is None else _known_distance(distance, names)
     counted = index_streams(streams)
     for note in counted.notes:
         reporter.note(note)
@@ -140,8 +140,8 @@ def calibrate_auto(
     floor_marks, backgrounds = 0, _background_images(foregrounds)
     if backgrounds:
         solution, floor_marks = sharpen_by_floor(views, solution, backgrounds)
-    if known is not None:
-        solution = scaled(solution, _scale(distance_factor(solution, *known)))
+    if stated_distance is not None:
+        solution = scaled(solution, _scale(distance_factor(solution, *stated_distance)))
     recording = _recording(output, streams, solution, cell)
     write_rig(output, recording)
     points = solution.adjustment.parameters.points
