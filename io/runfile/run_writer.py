@@ -41,7 +41,7 @@ class RunWriter:
     overwrite
         Whether an older file of that name may be replaced, at the end.
     kept
-        One of `stseg.io.runfile.layout.VOLUMES`: the part of the volume that is appended; the rest is NaN and background.
+        One of `layout.VOLUMES`: the part of the volume that is appended; the rest is NaN and background.
 
     Raises
     ------

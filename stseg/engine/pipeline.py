@@ -42,7 +42,7 @@ class CandidateSource(Protocol):
     """Candidates of a frame besides those of the detector."""
 
     def of(
-        self, seen: Sequence[ViewEvidence], fuse: Callable[[Sequence[ViewEvidence], Explanation], Singles]
+        self, evidence: Sequence[ViewEvidence], fuse: Callable[[Sequence[ViewEvidence], Explanation], Singles]
     ) -> Candidates:
         """Candidates from each view's evidence, and from a volume (plane, y, x) that is fused under an explanation."""
 
@@ -89,11 +89,11 @@ class Pipeline:
         return appearance_rows(frame, explanation, tables, self.axes, observations, evidence, images)
 
     def finished(
-        self, committed: Rows, events: Rows, appearance: Rows, shown: Rig | None = None
+        self, committed: Rows, events: Rows, appearance: Rows, image_rig: Rig | None = None
     ) -> tuple[Tracks, Ints]:
         """The tracks of a whole run (`finished_tracks`), their boxes in this rig's pixels or those of another."""
-        shown = self.rig if shown is None else shown
-        return finished_tracks(self.rig, self.config, self.tracker, committed, events, appearance, shown)
+        image_rig = self.rig if image_rig is None else image_rig
+        return finished_tracks(self.rig, self.config, self.tracker, committed, events, appearance, image_rig)
 
 
 def find_candidate_source(rig: Rig, kinds: Sequence[str], config: Config) -> CandidateSource | None:
@@ -111,7 +111,7 @@ def decides_by_appearance(tracker: type[TrackingMethod], config: Config) -> bool
 
 def finished_tracks(
     rig: Rig, config: Config, tracker: type[TrackingMethod], committed: Rows, events: Rows, appearance: Rows,
-    shown: Rig, known: Rows = NO_KNOWN_PEOPLE,
+    image_rig: Rig, known: Rows = NO_KNOWN_PEOPLE,
 ) -> tuple[Tracks, Ints]:  # fmt: skip
     """The tracks of a whole run, and the track id of each committed row.
 
@@ -125,24 +125,24 @@ def finished_tracks(
         All events, as the tracker committed them.
     appearance : APPEARANCE (l,)
         What the detections look like.
-    shown
+    image_rig
         The rig in whose pixels the tracks' boxes are given.
     known : KNOWN_PERSON (m,)
         People of earlier recordings.
     """
     if not tracker.final:
-        return associated_tracks(rig, config, committed, events, appearance, shown, known=known)
+        return associated_tracks(rig, config, committed, events, appearance, image_rig, known=known)
     whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
-    return _with_boxes(whole, shown), whole.identity
+    return _with_boxes(whole, image_rig), whole.identity
 
 
 def associated_tracks(
-    rig: Rig, config: Config, committed: Rows, events: Rows, appearance: Rows, shown: Rig,
+    rig: Rig, config: Config, committed: Rows, events: Rows, appearance: Rows, image_rig: Rig,
     constraints: Constraints = NO_CONSTRAINTS, known: Rows = NO_KNOWN_PEOPLE,
 ) -> tuple[Tracks, Ints]:  # fmt: skip
     """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
     whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints, known)
-    return _with_boxes(whole, shown), whole.identity
+    return _with_boxes(whole, image_rig), whole.identity
 
 
 def identity_problem(
@@ -153,6 +153,6 @@ def identity_problem(
     return IdentityProblem.of(bridged, sizes, appearance, rig.frame_rate, Border.of(rig), config, constraints)
 
 
-def _with_boxes(whole: FinalTracks, shown: Rig) -> Tracks:
-    tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]
+def _with_boxes(whole: FinalTracks, image_rig: Rig) -> Tracks:
+    tables = [BodyTable.of(camera, image_rig.grid) for camera in image_rig.cameras]
     return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events)

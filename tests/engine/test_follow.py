@@ -238,9 +238,7 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
 
 
 @quick
-def test_without_an_empty_scene_no_frame_is_lost(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)
     assert track(rig, output, "--follow", "--frames", f":{FRAMES}", "--set", "live.background_time=5") == 0
