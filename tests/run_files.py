@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Labels, Rows, Singles
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.runfile.layout import STEP, ghost_type
+from stseg.io.runfile.layout import LOG_ODDS_STEP, ghost_type
 from stseg.io.runfile.runs import RunWriter
 from stseg.records.tables import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
 
@@ -30,7 +30,7 @@ def small_recording(folder: Path) -> Recording:
 def small_volume(frames: int = len(FRAMES)) -> tuple[Singles, Labels]:
     """Log-odds with an unseen cell, and labels of tracks 1 and 2; (frames, 3, 4, 6)."""
     log_odds = np.random.default_rng(0).normal(0, 3, (frames, 3, 4, 6)).astype(np.float32)
-    log_odds = np.round(log_odds / np.float32(STEP)) * np.float32(STEP)
+    log_odds = np.round(log_odds / np.float32(LOG_ODDS_STEP)) * np.float32(LOG_ODDS_STEP)
     log_odds[:, 0, 0, 0] = np.nan
     label = np.zeros(log_odds.shape, np.int32)
     label[:, :, 1, 1] = 1

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from stseg.engine.offline.named import rows_with_ids
 
 from stseg.arrays import Ints, Rows
+from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import associated_tracks
 from stseg.engine.recordings import run_of
 from stseg.errors import ConfigError, FormatError, InputError

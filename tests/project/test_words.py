@@ -12,8 +12,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 FILES = (path for room in ("stseg", "io") for path in (ROOT / room).rglob("*.py"))
 SOURCES = sorted(path for path in FILES if "stseg/io" not in path.as_posix())
-    path for room in ("stseg", "io") for path in (ROOT / room).rglob("*.py") if "stseg/io" not in str(path)
-)
 ADJECTIVES = re.compile(
     r"_?(MOST|NEAR|LEAST|FAR|STEPS?|ALIKE|APART|REACH|LASTING|SURE|STILL|FEW|WORSE|OUT|TALL|WIDE|SEEN|DOUBTFUL|ALLOWED|"
     r"USUAL|FREELY|NOBODY|EARLY|LATE|FIRST|LAST|KNOWN|OWN|SHARP|LONG|SHORT|SMALL|LARGE|MANY|ENOUGH|UNKNOWN|FRESH|OPEN|"
