@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.tracking.windows.stitching import matches
+from stseg.tracking.segment_stitching import matches
 from stseg.trajectories.live_corrections import corrected
 
 Names = dict[int, int]

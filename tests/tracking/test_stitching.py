@@ -12,7 +12,7 @@ from stseg.config import Config, SegmentConfig, TrackingConfig
 from stseg.engine.offline.segments import segments
 from stseg.errors import ConfigError
 from stseg.records.tables import EVENT, TRAJECTORY
-from stseg.tracking.windows.stitching import SegmentTracks, Stitcher, rename_labels
+from stseg.tracking.segment_stitching import SegmentTracks, Stitcher, rename_labels
 from stseg.tracking.windows.windows import windows
 
 

@@ -22,7 +22,7 @@ from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_l
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
-from stseg.tracking.windows.stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
+from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
 
 _BLOCK = 64
 """Frames of the volume read at a time."""

@@ -56,7 +56,7 @@ class SegmentWriter(AbstractContextManager["SegmentWriter"]):
     """Writes the file of a segment; one that `keep` has not completed is discarded on exit.
 
     Of the warm-up the file has the trajectory alone: by it the segment's tracks are associated with those of the
-    segment before (`stseg.tracking.windows.stitching`).
+    segment before (`stseg.tracking.segment_stitching`).
 
     Parameters
     ----------
