@@ -66,7 +66,7 @@ def _checked_notes(notes: object) -> dict[str, list[tuple[str, int]]]:
 
 
 class ArrivingFiles:
-    """The files of a pattern in chronological order, each once it is complete.
+    """The files of a pattern in the order of their names, numbers by value, each once it is complete.
 
     A file is complete when a later one exists, or when it has not grown for some time.
 

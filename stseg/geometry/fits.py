@@ -79,7 +79,7 @@ def focal_of_square_pixels(homography: Floats, size: tuple[int, int]) -> float |
 
     Returns
     -------
-    float, pixels, or None where it is not determined: a view straight down, or along a ground axis.
+    float, pixels, or None where it is not determined (a view straight down) or outside 0.2 to 10 image widths.
     """
     first, second, _ = (np.linalg.inv(middle_matrix(1.0, size)) @ homography).T
     # flat / f^2 + deep = 0
