@@ -19,6 +19,10 @@ from stseg.detection.problem import (
 )
 from stseg.detection.score.scoring import set_score
 from stseg.detection.search.best_set import ENUMERATION_LIMIT, find_best_set
+from stseg.kernels.accelerate import COMPILED
+
+MAP_TYPE: type[np.float32] = np.float32 if COMPILED else np.float64  # type: ignore[assignment]
+"""Type of maps: plain Python would sum float32 in float32, compiled code sums it in float64."""
 
 PARAMETERS = ScoreParameters(-3.0, 0.3, 0.25, 0.42, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
 
@@ -81,7 +85,7 @@ def random_frame(seed: int, candidates: int, tracks: int = 0) -> CraftedFrame:
     stop = np.minimum(start + rng.integers(0, 6, start.shape), columns)
     first = rng.integers(-1, rows - 1, (views, candidates))
     area = (stop - start).sum(-1) + rng.integers(1, 5, (views, candidates)).astype(float)
-    raster = rng.normal(0.3, 1.5, (views, rows, columns)).astype(np.float32)
+    raster = rng.normal(0.3, 1.5, (views, rows, columns)).astype(MAP_TYPE)
     spans, distance = np.stack([start, stop], -1).astype(np.int16), rng.uniform(1, 5, (views, candidates))
     pixels = PixelEvidence(raster, np.zeros_like(raster), first, spans, area, distance)
     size_prior, ground = rng.normal(0, 0.5, candidates), rng.uniform(0, 1.2, (candidates, 2))
@@ -94,7 +98,7 @@ def random_frame(seed: int, candidates: int, tracks: int = 0) -> CraftedFrame:
 def scaled(frame: CraftedFrame) -> CraftedFrame:
     """The same, half the pixels explained by bodies of some scale."""
     rng = np.random.default_rng(len(frame.size_prior))
-    scale = rng.uniform(-20, 20, frame.pixels.raster.shape).clip(0).astype(np.float32)
+    scale = rng.uniform(-20, 20, frame.pixels.raster.shape).clip(0).astype(MAP_TYPE)
     return replace(frame, pixels=frame.pixels._replace(scale=scale))
 
 

@@ -9,15 +9,12 @@ from crafted_frames import PARAMETERS, hiders_of_cover, in_rooms, random_frame, 
 from reference_track_filter import best_pairs
 from scipy.optimize import linear_sum_assignment
 
+from stseg.bodies.outlines import paint
 from stseg.detection.problem import BoxEvidence, PixelEvidence
 from stseg.detection.score.box_state import clear_cache
-from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_scores, set_score
+from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_scores, pixel_score, set_score
 from stseg.detection.score.set_state import SetState, add, assign, changed, gain, put, release, set_state, withdraw
 from stseg.detection.score.track_state import assign_track, track_gain, track_state
-from stseg.kernels.accelerate import COMPILED
-
-ROUNDING = 1e-9 if COMPILED else 1e-6
-"""Error of a gain, nats: plain Python keeps sums of the maps' float32 in float32, compiled code in float64."""
 
 
 @pytest.mark.parametrize("tracks", [0, 3])
@@ -90,6 +87,20 @@ def test_pixels_weigh_no_more_than_in_the_largest_body() -> None:
     assert evidence == pytest.approx([PARAMETERS.effective_observations, PARAMETERS.effective_observations / 4])
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_painted_pixels_are_those_of_the_score(seed: int) -> None:
+    frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
+    pixels = frame.pixels
+    for view in range(len(pixels.raster)):
+        owner, parts = np.full(pixels.raster[view].size, -1), np.empty(3)
+        pixel_score(view, members, 3, pixels, PARAMETERS, owner, parts)
+        painted = np.full(pixels.raster[view].shape, -1, np.int16)
+        farthest_first = np.argsort(pixels.distance[view][members], kind="stable")[::-1].copy()
+        paint(farthest_first, pixels.first[view][members], pixels.spans[view][members], painted)
+        assert (painted >= 0).any()
+        np.testing.assert_array_equal(painted.ravel(), owner)
+
+
 # The state of a set
 
 
@@ -123,12 +134,12 @@ def test_gains_are_differences_of_scores(seed: int, tracks: int) -> None:
         assert_nearest_own_pixels(state)
         score = frame.score(members)
         for i in np.flatnonzero(~state.inside).tolist():
-            expected = pytest.approx(frame.score([*members, i]) - score, abs=ROUNDING)
+            expected = pytest.approx(frame.score([*members, i]) - score, abs=1e-9)
             assert gain(i, state, True) == expected
             assert gain(i, state, False) == expected
         for place, i in enumerate(members.tolist()):
             assert withdraw(place, state) == i
-            assert gain(i, state, True) == pytest.approx(score - frame.score(np.delete(members, place)), abs=ROUNDING)
+            assert gain(i, state, True) == pytest.approx(score - frame.score(np.delete(members, place)), abs=1e-9)
             put(i, place, state)
             np.testing.assert_array_equal(state.members[: len(members)], members)
     assert cached > 0
