@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stseg.errors import FormatError
-from stseg.io.toml.text import abbreviated, one_of
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
-from stseg.io.untrusted.names import EXPECTED_TITLE, is_title
-from stseg.io.untrusted.numbers import parse_whole
+from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, one_of, parse_whole
 
 COLUMNS = ("action", "frame", "id", "other", "name")
 

@@ -10,11 +10,9 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
-from stseg.io.untrusted.names import EXPECTED_TITLE, is_title
-from stseg.io.untrusted.numbers import finite_number
+from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, finite_number, is_title
 
 Named = tuple[str, tuple[Floats, ...]]
 """A feature's name and its rings or lines, float64 (k, 2) each."""

@@ -11,10 +11,9 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.errors import FormatError, OutputError
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
-from stseg.io.untrusted.numbers import parse_number
+from stseg.io.untrusted.values import abbreviated, parse_number
 
 POSITION = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("flag", "<i8")])
 """One row per person and frame: metres on the ground; a flag other than 0 marks an unreliable row."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, Recording, Source
-from stseg.io.untrusted.names import is_name
+from stseg.io.untrusted.values import is_name
 
 BARREL = (-0.39, 0.25, 0.0008, -0.0017, -0.107)
 """A strong barrel, whose polynomial turns round about 48 degrees off the axis."""

@@ -25,7 +25,7 @@ from stseg.evaluation.scores import Scores
 from stseg.evaluation.sequence import Area
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
-from stseg.io.recording.appearance_axes import appearance_axes
+from stseg.io.detections.source_detections import appearance_axes
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_recording

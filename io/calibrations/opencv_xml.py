@@ -14,9 +14,8 @@ from stseg.errors import FormatError
 from stseg.geometry import Lens
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.outputs.whole_files import replacing
-from stseg.io.untrusted.names import printable
-from stseg.io.untrusted.numbers import parse_numbers
-from stseg.io.untrusted.safe_xml import parse_xml
+from stseg.io.untrusted.bounded_files import parse_xml
+from stseg.io.untrusted.values import parse_numbers, printable
 
 _MATRIX = ("camera_matrix",)
 _DISTORTION = ("distortion_coefficients",)

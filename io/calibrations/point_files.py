@@ -11,11 +11,9 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.errors import FormatError
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
-from stseg.io.untrusted.names import EXPECTED, is_name
-from stseg.io.untrusted.numbers import parse_number
+from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name, parse_number
 
 _NEEDED = ("camera", "u", "v", "x", "y")
 

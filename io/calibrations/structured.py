@@ -16,8 +16,7 @@ from stseg.io.toml.table import ANY
 from stseg.io.toml.text import parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
-from stseg.io.untrusted.names import printable
-from stseg.io.untrusted.numbers import parse_whole
+from stseg.io.untrusted.values import parse_whole, printable
 
 _LONGEST_YAML, _DEEPEST_YAML = 1 << 18, 50
 """Characters, and nested brackets: PyYAML needs a time that grows with the square of these."""

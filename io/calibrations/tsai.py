@@ -19,9 +19,8 @@ from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.names import printable
-from stseg.io.untrusted.numbers import parse_numbers
-from stseg.io.untrusted.safe_xml import parse_xml
+from stseg.io.untrusted.bounded_files import parse_xml
+from stseg.io.untrusted.values import parse_numbers, printable
 
 _BEFORE_TURN = 0.9
 """Share of the radius at which the cubic turns round up to which it is followed."""

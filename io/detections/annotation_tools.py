@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 
 from stseg.errors import FormatError
-from stseg.io.detections.frame_names import listed_frames
-from stseg.io.detections.json_files import require
 from stseg.io.detections.masks import Polygons, flat_polygons
-from stseg.io.detections.record import DetectionList, Detections, Request, number
+from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, number, require
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.safe_xml import parse_xml
+from stseg.io.untrusted.bounded_files import parse_xml
 
 
 def read_cvat(request: Request) -> Detections:

@@ -17,7 +17,7 @@ from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
-from stseg.io.untrusted.numbers import parse_number
+from stseg.io.untrusted.values import parse_number
 
 _NEEDED = ("frame", "left", "top", "width", "height")
 _MOT = (0, 2, 3, 4, 5, 6)  # frame, (id), left, top, width, height, conf

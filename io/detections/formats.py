@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from stseg.errors import FormatError, SourceError
-from stseg.io.detections import annotation_tools, coco, mmdetection, motchallenge, tables, wildtrack, yolo
-from stseg.io.detections.json_files import read_json
-from stseg.io.detections.record import Detections, Request
+from stseg.io.detections import annotation_tools, json_formats, tables, yolo
+from stseg.io.detections.record import Detections, Request, read_json
 from stseg.io.recording.source_files import numeric_order
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
-from stseg.io.untrusted.names import printable
+from stseg.io.untrusted.values import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +27,9 @@ class JsonFormat:
 
 
 JSON_FORMATS = (
-    JsonFormat("COCO results", coco.is_results, coco.read_results),
-    JsonFormat("COCO data set", coco.is_dataset, coco.read_dataset),
-    JsonFormat("MMDetection", mmdetection.is_list, mmdetection.read_list),
+    JsonFormat("COCO results", json_formats.is_results, json_formats.read_results),
+    JsonFormat("COCO data set", json_formats.is_dataset, json_formats.read_dataset),
+    JsonFormat("MMDetection", json_formats.is_mmdetection, json_formats.read_mmdetection),
     JsonFormat("Ultralytics JSON", yolo.is_results, yolo.read_results),
     JsonFormat("Label Studio", annotation_tools.is_label_studio, annotation_tools.read_label_studio),
     JsonFormat("VIA", annotation_tools.is_via, annotation_tools.read_via),
@@ -79,8 +78,8 @@ def _read(request: Request, path: Path) -> tuple[str, Detections] | None:
         return "Parquet", tables.read_parquet(request)
     if request.columns or _needs_mapping(path):
         return "CSV", tables.read_csv(request)
-    if motchallenge.is_ground_truth(path):
-        return "MOTChallenge truth", motchallenge.read_ground_truth(request)
+    if tables.is_ground_truth(path):
+        return "MOTChallenge truth", tables.read_ground_truth(request)
     return None
 
 
@@ -99,13 +98,13 @@ def _read_folder(request: Request) -> tuple[str, Detections]:
     if not files:
         raise SourceError(request.path, "", "a folder without text or JSON files", "detections, one file a frame")
     data = [read_json(path) for path in files]
-    if any(map(wildtrack.is_frame, data)):
-        return "WILDTRACK", wildtrack.read_frames(request, files, data)
-    if all(map(mmdetection.is_prediction, data)):
-        return "MMDetection", mmdetection.read_list(request, data)
+    if any(map(json_formats.is_wildtrack, data)):
+        return "WILDTRACK", json_formats.read_wildtrack(request, files, data)
+    if all(map(json_formats.is_prediction, data)):
+        return "MMDetection", json_formats.read_mmdetection(request, data)
     if all(map(yolo.is_frame_of_results, data)):
         return "Ultralytics JSON", yolo.read_results(request, data)
-    wrong = next((k for k, one in enumerate(data) if not mmdetection.is_prediction(one)), 0)
+    wrong = next((k for k, one in enumerate(data) if not json_formats.is_prediction(one)), 0)
     raise FormatError(files[wrong], "", "JSON of no known detections", f"one of {', '.join(NAMES)}")
 
 

@@ -1,21 +1,28 @@
-"""Detections of one camera as a detector or an annotation tool writes them, before frames are counted from 0."""
+"""Detections of one camera as a detector or an annotation tool writes them, before frames are counted from 0.
+
+Beside the record: its builder, JSON and its keys, and frame numbers from the names of files and images.
+"""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
+from typing import Any
 
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
-from stseg.errors import FormatError
+from stseg.errors import FormatError, SourceError
 from stseg.io.detections.masks import Mask
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.numbers import finite_number, parse_number
+from stseg.io.untrusted.bounded_files import parse_json, read_text
+from stseg.io.untrusted.values import abbreviated, finite_number, parse_number
 
 LEAST_NUMBERS = ("frame", "left", "top", "width", "height", "score")
+_DIGITS = re.compile(r"[0-9]+")
 
 
 @dataclass(frozen=True)
@@ -168,3 +175,76 @@ def number(path: Path, place: str, name: str, value: object) -> float:
     if found is None or not abs(found) <= limits.NUMBER:
         raise FormatError(path, place, f"{name} {abbreviated(value)}", "a finite number of usual size")
     return found
+
+
+def read_json(path: Path) -> Any:
+    """Parsed JSON; of JSON lines, the list of the lines.
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where the file cannot be read, or is no JSON: names the line.
+    """
+    try:
+        text = read_text(path, limits.DETECTIONS_FILE)
+    except OSError as error:
+        raise SourceError(path, "", error.strerror or error, "a file of detections") from error
+    except UnicodeDecodeError as error:
+        raise FormatError(path, "", "bytes that are no text", "JSON in UTF-8") from error
+    except ValueError as error:
+        raise FormatError(path, "", error, "a file of detections") from error
+    try:
+        return parse_json(text)
+    except ValueError as whole:
+        lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+        if len(lines) < 2 or not _is_json(lines[0][1]):
+            place = f"line {whole.lineno}" if isinstance(whole, json.JSONDecodeError) else ""
+            raise FormatError(path, place, f"no JSON ({whole})"[:100], "JSON") from whole
+    return [_line(path, number, line) for number, line in lines]
+
+
+def _line(path: Path, number: int, line: str) -> Any:
+    try:
+        return parse_json(line)
+    except ValueError as error:
+        raise FormatError(path, f"line {number}", f"no JSON ({error})"[:100], "JSON, one value a line") from error
+
+
+def _is_json(text: str) -> bool:
+    try:
+        parse_json(text)
+    except ValueError:
+        return False
+    return True
+
+
+def require(path: Path, place: str, values: Any, key: str) -> Any:
+    """The value of a key; FormatError where it is missing."""
+    if not isinstance(values, dict) or key not in values:
+        raise FormatError(path, place, f"no {key}", f"the key {key}")
+    return values[key]
+
+
+def last_numbers(names: Sequence[str]) -> Ints | None:
+    """The last number in each name, int64 (n,); None where a name has none or two share one."""
+    found = [_DIGITS.findall(PurePath(name).stem) for name in names]
+    numbers = [int(digits[-1][-15:]) for digits in found if digits]
+    return None if len(set(numbers)) < len(names) else np.array(numbers, np.int64)
+
+
+def listed_frames(names: Sequence[str]) -> tuple[Ints, int | None]:
+    """Frames of listed images, int64 (n,), and their count.
+
+    Images at equal steps are consecutive frames, counted from 0; with unequal gaps their numbers are the frames, and
+    the count is unknown. Names without usable numbers are frames in the order of the list.
+    """
+    numbers = last_numbers(names)
+    if numbers is None:
+        return np.arange(len(names), dtype=np.int64), len(names)
+    if len(numbers) < 2:
+        return np.zeros(len(numbers), np.int64), len(names)
+    step = int(np.gcd.reduce(np.diff(np.sort(numbers))))
+    ranks = (numbers - numbers.min()) // step
+    if int(ranks.max()) + 1 == len(numbers):
+        return ranks, len(names)
+    return numbers, None

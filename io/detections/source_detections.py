@@ -10,14 +10,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
-from stseg.io.detections.appearance_files import read_features
 from stseg.io.detections.box_files import BoxTable, read_boxes
 from stseg.io.detections.formats import read_detections
 from stseg.io.detections.masks import Polygons
 from stseg.io.detections.record import Detections, Request
-from stseg.io.recording.recording import Source
+from stseg.io.recording.recording import Recording, Source
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.numpy_files import read_npy
+from stseg.records.principal_axes import principal_axes
+from stseg.records.tables import FEATURES
+
+_BOXES_OF_AXES = 20_000
+"""Most boxes of a camera from which axes are learned."""
+_FEATURES = "a .npy array of numbers, one row a detection"
 
 
 @dataclass(frozen=True)
@@ -152,3 +159,49 @@ def _box(pixel: Floats, size: tuple[int, int]) -> Polygons:
     left, right = np.clip([left, left + width], -1, size[0])
     top, bottom = np.clip([top, top + height], -1, size[1])
     return Polygons((np.array([[left, top], [right, top], [right, bottom], [left, bottom]]),))
+
+
+def appearance_axes(recording: Recording) -> Floats | None:
+    """Principal axes of all cameras' features, float64 (feature, FEATURES or less); None where boxes have none.
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where a file cannot be read, or cameras have features of different lengths.
+    """
+    samples = list[Singles]()
+    for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True):
+        if feed.source.appearance is None:
+            continue
+        features = read_source(feed.source, camera.size).kept.features
+        if features is None or not len(features):
+            continue
+        if samples and features.shape[1] != samples[0].shape[1]:
+            found, expected = f"{features.shape[1]} numbers a box", f"{samples[0].shape[1]}, as of the cameras before"
+            raise FormatError(feed.source.appearance, "", found, expected)
+        step = -(-len(features) // _BOXES_OF_AXES)
+        samples.append(np.asarray(features[::step]))
+    return principal_axes(samples, FEATURES) if samples else None
+
+
+def read_features(path: Path, detections: int) -> Singles:
+    """Features of the detections of one file, in its order, float32 (detection, feature).
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where the file cannot be read, or has another number of rows, or numbers that are not finite.
+    """
+    try:
+        array = read_npy(path)
+    except OSError as error:
+        raise SourceError(path, "", error.strerror or error, _FEATURES) from error
+    except ValueError as error:
+        raise FormatError(path, "", error, _FEATURES) from error
+    if array.ndim != 2 or array.dtype.kind not in "fiu" or not 1 <= array.shape[1] <= limits.FEATURES:
+        raise FormatError(path, "", f"an array of {array.dtype} {array.shape}", _FEATURES)
+    if len(array) != detections:
+        raise FormatError(path, "", f"{len(array)} rows", f"{detections}, one a detection")
+    if not (np.abs(array.astype(np.float64)) <= limits.NUMBER).all():
+        raise FormatError(path, "", "a number that is not finite, or huge", "finite numbers of usual size")
+    return array.astype(np.float32)

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from stseg.errors import FormatError, SourceError
-from stseg.io.detections.frame_names import last_numbers
-from stseg.io.detections.json_files import require
 from stseg.io.detections.masks import Mask, flat_polygons, polygons
-from stseg.io.detections.record import DetectionList, Detections, Request, number
+from stseg.io.detections.record import DetectionList, Detections, Request, last_numbers, number, require
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
 

@@ -13,7 +13,7 @@ import numpy as np
 from stseg.arrays import Rows
 from stseg.io.extras import load_extra
 from stseg.io.runfile.reading.run_reader import Run
-from stseg.io.untrusted.names import printable, require_utf8
+from stseg.io.untrusted.values import printable, require_utf8
 
 _TABLES: Mapping[str, tuple[tuple[str, str], ...]] = {
     "recordings": (

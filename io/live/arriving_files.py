@@ -13,14 +13,14 @@ from threading import Event, Lock
 from stseg.arrays import Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.live.live_frames import now
+from stseg.io.live.live_stream import now
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.recording import Source
 from stseg.io.recording.source_files import numeric_order
 from stseg.io.recording.video.video_stream import VideoStream
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
-from stseg.io.untrusted.names import is_file_name
+from stseg.io.untrusted.values import is_file_name
 
 _POLL = 0.1
 """Interval at which a folder is listed, seconds."""
@@ -150,7 +150,7 @@ class ArrivingVideos:
         self._stream: VideoStream | None = None
         self._path, self._read, self._size = Path(), 0, 0
         self.arrived = 0.0
-        """When the file of the last frame became complete, by `stseg.io.live.live_frames.now`."""
+        """When the file of the last frame became complete, by `stseg.io.live.live_stream.now`."""
 
     def skip(self, count: int) -> int:
         """Skip up to `count` frames; return how many there were."""

@@ -21,8 +21,7 @@ from typing import Self
 
 from stseg.arrays import Observation
 from stseg.config import LiveConfig
-from stseg.io.live.live_frames import LiveFrameSet, now
-from stseg.io.live.live_stream import Capture, FFmpegCapture, LiveStream, TimedPicture
+from stseg.io.live.live_stream import Capture, FFmpegCapture, LiveFrameSet, LiveStream, TimedPicture, now
 from stseg.io.recording.recording import Recording
 
 _POLL = 0.2
@@ -46,7 +45,7 @@ class FollowedCameras:
     config
         Timeouts, and the size of the queue.
     start
-        Time of frame 0, by `stseg.io.live.live_frames.now`, of a resumed run; else the clock starts when all cameras
+        Time of frame 0, by `stseg.io.live.live_stream.now`, of a resumed run; else the clock starts when all cameras
         deliver pictures, or `config.stream_timeout` after the first does.
     halt
         Stops the clock; queued frame sets are still delivered.

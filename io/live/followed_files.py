@@ -18,7 +18,7 @@ from stseg.config import LiveConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.live.arriving_files import ArrivingFiles, ArrivingVideos, FileNotes
-from stseg.io.live.live_frames import LiveFrameSet
+from stseg.io.live.live_stream import LiveFrameSet
 from stseg.io.recording.recording import CameraSource, Recording
 
 _POLL = 0.2
@@ -26,7 +26,7 @@ _POLL = 0.2
 
 
 class FollowedFiles:
-    """Frame sets of a recording whose videos arrive as files, a pattern each (see `stseg.io.live.live_frames.is_live`).
+    """Frame sets of a recording whose videos arrive as files, a pattern each (see `stseg.io.live.live_stream.is_live`).
 
     Parameters
     ----------

@@ -1,24 +1,26 @@
-"""One live stream, read by FFmpeg and reconnected for as long as it takes when it breaks."""
+"""One live stream, read by FFmpeg and reconnected as long as it takes when it breaks; the clock of live frames."""
 
 from __future__ import annotations
 
 import os
 import re
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from threading import Condition, Event, Thread
 from typing import NamedTuple, Protocol
 
 import cv2
 
 import stseg.io.recording.video.ffmpeg  # noqa: F401  # quietens FFmpeg before its first use
-from stseg.arrays import AnyArray
+from stseg.arrays import AnyArray, Observation
 from stseg.config import LiveConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.live.live_frames import now
+from stseg.io.recording.image_stream import is_pattern
 from stseg.io.recording.pictures import as_observation, reduced_picture
-from stseg.io.recording.recording import Source, mask_passwords
+from stseg.io.recording.recording import Recording, Source, mask_passwords
 
 _PROTOCOLS = "rtsp,rtsps,rtp,srtp,rtmp,rtmps,rtmpt,srt,udp,tcp,tls,http,https,httpproxy,crypto"
 _OPTIONS = f"rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000|protocol_whitelist;{_PROTOCOLS}"
@@ -26,6 +28,7 @@ _OPTIONS = f"rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000|protocol
 
 _ADDRESS = re.compile(r"(rtsps?|rtmps?|https?|srt|udp|tcp|rtp)://[^\s\x00-\x1f]+\Z", re.ASCII | re.IGNORECASE)
 """Addresses that are opened; above all, none of files and pipes."""
+_ZERO = time.time() - time.monotonic()
 
 
 class Capture(Protocol):
@@ -39,7 +42,7 @@ class Capture(Protocol):
 
 
 class TimedPicture(NamedTuple):
-    """A picture and its time of arrival, by `stseg.io.live.live_frames.now`."""
+    """A picture and its time of arrival, by `stseg.io.live.live_stream.now`."""
 
     at: float
     picture: AnyArray
@@ -189,3 +192,53 @@ class LiveStream(Thread):
 
     def _notify(self, what: str) -> None:
         self._report(f"camera {self._camera.name}: {what}")
+
+
+def now() -> float:
+    """Seconds since 1970 by a monotonic clock."""
+    return _ZERO + time.monotonic()
+
+
+@dataclass(frozen=True, slots=True)
+class LiveFrameSet:
+    """The observations of all cameras at one time.
+
+    Attributes
+    ----------
+    frame
+        The recording's frame.
+    views
+        One observation per camera in the rig's order, None where a camera is blind.
+    arrived
+        When all its observations had arrived, by `now`.
+    dropped
+        Whether its observations were dropped because tracking is slower than the cameras.
+    images
+        Empty: live cameras deliver no detections.
+    """
+
+    frame: int
+    views: tuple[Observation, ...]
+    arrived: float
+    dropped: bool = False
+    images: tuple[Observation, ...] = ()
+
+
+def is_live(recording: Recording) -> bool:
+    """Whether the cameras of a recording are live streams; False where its videos arrive as files.
+
+    Raises
+    ------
+    SourceError
+        Where its sources are neither, or mixed.
+    """
+    sources = [source.source for source in recording.sources]
+    live = any(source.address for source in sources)
+    for camera, source in zip(recording.rig.cameras, sources, strict=True):
+        key = f"camera {camera.name}"
+        if live and not source.address:
+            raise SourceError(source.path, key, "files beside live streams", "all cameras live, or none")
+        if not live and (source.kind not in ("video", "masks") or source.more or not is_pattern(source.path)):
+            found = f"{len(source.more) + 1} paths" if source.more else f"kind {source.kind}, path {source.path.name}"
+            raise SourceError(source.path, key, found, "videos by a pattern (cam1_*.mp4), or an address (rtsp://...)")
+    return live

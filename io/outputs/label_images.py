@@ -17,9 +17,8 @@ import numpy as np
 from stseg.arrays import Bytes, Ints
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import clear_frames, output_error, write_quickly
-from stseg.io.recording.indexed_png import encode_indexed
-from stseg.io.toml.text import abbreviated
-from stseg.io.untrusted.names import EXPECTED, is_name
+from stseg.io.recording.pictures import encode_indexed
+from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name
 
 _BYTE, _WORD = 255, 65535
 

@@ -30,7 +30,7 @@ from stseg.geometry import Camera, Rig
 from stseg.io.outputs.whole_files import clear_frames
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source, SourceKind
 from stseg.io.recording.rigs import write_rig
-from stseg.io.untrusted.names import require_utf8
+from stseg.io.untrusted.values import require_utf8
 
 _ANYBODY = BodyPrior()
 Progress = Callable[[int, int], None]

@@ -10,7 +10,7 @@ import cv2
 from stseg.arrays import Bytes
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import replacing
-from stseg.io.untrusted.names import require_utf8
+from stseg.io.untrusted.values import require_utf8
 
 _ENDING = ".mp4"
 

@@ -21,6 +21,7 @@ from stseg.arrays import Observation
 from stseg.errors import ConfigError, SourceError
 from stseg.io.recording.aligned_stream import (
     AlignedStream,
+    StreamIndex,
     decoder_threads,
     open_aligned_stream,
     open_aligned_streams,
@@ -28,7 +29,6 @@ from stseg.io.recording.aligned_stream import (
     recording_length,
 )
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.recording.streams import open_stream
 from stseg.io.recording.time_alignment import with_alignment
 

@@ -20,11 +20,11 @@ from stseg.errors import SourceError
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
-from stseg.io.runfile.reading.texts import read_attribute, read_text
+from stseg.io.runfile.reading.hdf5_reading import read_attribute, read_text
 from stseg.io.toml.text import parse_toml
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.names import printable
 from stseg.io.untrusted.safe_hdf5 import read_whole
+from stseg.io.untrusted.values import printable
 from stseg.version import __version__
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")

@@ -13,8 +13,8 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from stseg.errors import ConfigError
-from stseg.io.toml.text import abbreviated, one_of, toml_string
-from stseg.io.untrusted.numbers import finite_number
+from stseg.io.toml.text import toml_string
+from stseg.io.untrusted.values import abbreviated, finite_number, one_of
 
 T = TypeVar("T")
 

@@ -11,10 +11,8 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import InputError, RigError
-from stseg.io.toml.text import abbreviated, one_of
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.names import EXPECTED, is_name, is_path
-from stseg.io.untrusted.numbers import finite_number
+from stseg.io.untrusted.values import EXPECTED, abbreviated, finite_number, is_name, is_path, one_of
 
 ANY = -1
 """In a shape: any number of rows."""
@@ -65,7 +63,7 @@ class Table:
         return value
 
     def name(self, name: str) -> str:
-        """The name of a camera or scene, see `stseg.io.untrusted.names`."""
+        """The name of a camera or scene, see `stseg.io.untrusted.values`."""
         value = self.text(name)
         if not is_name(value):
             raise self.error(name, abbreviated(value), EXPECTED)

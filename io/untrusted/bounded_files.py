@@ -1,12 +1,17 @@
-"""Whole files from outside, read within a bound; pipes and devices are refused rather than waited for."""
+"""Whole files from outside, read within a bound; pipes and devices are refused rather than waited for.
+
+XML is read without document types, so that no entity can be declared and expanded.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import stat
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
+from stseg.errors import FormatError
 from stseg.io.untrusted import limits
 
 
@@ -61,3 +66,30 @@ def is_regular(path: Path) -> bool:
         return stat.S_ISREG(os.lstat(path).st_mode)
     except (OSError, ValueError):
         return False
+
+
+def parse_xml(file: Path, expected: str) -> ElementTree.Element:
+    """The root of an XML file.
+
+    Parameters
+    ----------
+    file
+    expected
+        The expected kind of XML, for errors.
+
+    Raises
+    ------
+    FormatError
+        Where it cannot be read, is no XML, or declares a document type.
+    """
+    try:
+        text = read_text(file)
+        # Entities are declared in a document type, which no calibration has: refusing it leaves nothing to expand.
+        # The check is on decoded text and the parser gets that text, so no declared encoding can hide one.
+        if "<!DOCTYPE" in text or "<!ENTITY" in text:
+            raise FormatError(file, "", "a document type declaration", f"{expected}, which has none")
+        return ElementTree.fromstring(text)
+    except OSError as error:
+        raise FormatError(file, "", error.strerror or error, "a calibration file") from error
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        raise FormatError(file, "", f"what is not XML ({error})", expected) from error

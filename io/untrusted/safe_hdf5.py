@@ -1,19 +1,24 @@
 """HDF5 files from outside: opened without links, storage, filters or references that lead out of the file.
 
 An HDF5 file may name other files (external links, external storage, virtual datasets) and would show their contents as
-its own. Sizes are checked before anything is read: what a dataset declares must have been stored in the file. Nor does
-HDF5 check all that it follows: `global_heaps` does where it would not come back.
+its own. Sizes are checked before anything is read: what a dataset declares must have been stored in the file.
+
+Texts of any length stand in global heap collections (HDF5 File Format Specification 3.0, section III.E): a header of 16
+bytes, then objects, each with a header of 16 bytes, and at the end the free space as object 0. HDF5 trusts the size of
+the free space; where that is false, it walks on the spot without end and cannot be interrupted.
+So heaps are checked first.
 """
 
 from __future__ import annotations
 
 import errno
 import math
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import BinaryIO, Literal
 
 import h5py
 import numpy as np
@@ -21,8 +26,7 @@ from h5py import h5z
 
 from stseg.arrays import AnyArray
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.global_heaps import require_sound_heaps
-from stseg.io.untrusted.names import printable
+from stseg.io.untrusted.values import printable
 
 _FILTERS = frozenset((h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SCALEOFFSET))
 """Filters of HDF5 itself; any other would be loaded as a library from a folder of plug-ins."""
@@ -31,6 +35,10 @@ _PACKED = 1100
 _DEEPEST = 8
 _CHUNK = 1 << 29
 """Bytes of one chunk, which HDF5 unpacks at once."""
+_SIGNATURE = b"GCOL\x01\x00\x00\x00"
+_HEADER = 16
+"""Bytes of a collection's header, and of each object's, where addresses and lengths have 8 bytes."""
+_BLOCK = 1 << 24
 
 
 def hdf5_file(path: Path | str, mode: Literal["r", "r+"]) -> h5py.File:
@@ -92,7 +100,7 @@ def require_stored(dataset: h5py.Dataset, most: int) -> None:
 
 
 def _require_known_sizes(file: h5py.File) -> None:
-    """Addresses and lengths of 8 bytes, as every library of today writes: `global_heaps` reads no others."""
+    """Addresses and lengths of 8 bytes, as every library of today writes: no other heaps are checked."""
     sizes = file.id.get_create_plist().get_sizes()
     if sizes != (8, 8):
         raise ValueError(f"addresses and lengths of {sizes} bytes, expected 8 and 8")
@@ -126,3 +134,53 @@ def _require_own_storage(key: str, dataset: h5py.Dataset) -> None:
         raise ValueError(f"{key}: packed with filters {sorted(filters - _FILTERS)}")
     if dataset.chunks is not None and math.prod(dataset.chunks) * dataset.dtype.itemsize > _CHUNK:
         raise ValueError(f"{key}: chunks of {math.prod(dataset.chunks) * dataset.dtype.itemsize} bytes")
+
+
+def require_sound_heaps(path: Path) -> None:
+    """Raise ValueError, in one line, where a global heap of a file would not be left again.
+
+    The bytes of the whole file are searched, so that a collection is found wherever a text claims to stand.
+    """
+    with path.open("rb") as file:
+        end = 0
+        for start in _collections(file):
+            if start < end:
+                raise ValueError(f"a global heap at byte {start} inside of another")
+            file.seek(start)
+            end = start + _size_of_collection(file, start)
+
+
+def _collections(file: BinaryIO) -> Iterator[int]:
+    """Places of all signatures; blocks overlap by what a signature may stand astride."""
+    place = 0
+    while len(block := _block(file, place)) >= len(_SIGNATURE):
+        found = block.find(_SIGNATURE)
+        while found >= 0:
+            yield place + found
+            found = block.find(_SIGNATURE, found + 1)
+        place += len(block) - len(_SIGNATURE) + 1
+
+
+def _block(file: BinaryIO, place: int) -> bytes:
+    file.seek(place)
+    return file.read(_BLOCK)
+
+
+def _size_of_collection(file: BinaryIO, start: int) -> int:
+    """Bytes of the collection that begins here; ValueError where its objects do not lead to its end."""
+    header = file.read(_HEADER)
+    size = struct.unpack_from("<Q", header, 8)[0] if len(header) == _HEADER else 0
+    if not _HEADER <= size <= limits.UNPACKED:
+        raise ValueError(f"a global heap at byte {start} of {size} bytes, expected {_HEADER} to {limits.UNPACKED}")
+    collection = header + file.read(size - _HEADER)
+    if len(collection) < size:
+        raise ValueError(f"a global heap at byte {start} of {size} bytes, more than the file has")
+    place = _HEADER
+    while size - place >= _HEADER:
+        index, length = struct.unpack_from("<H6xQ", collection, place)
+        if index == 0 and length != size - place:
+            raise ValueError(f"a global heap at byte {start}: {length} bytes free, found room for {size - place}")
+        place += length if index == 0 else _HEADER + -(-length // 8) * 8
+    if place > size:
+        raise ValueError(f"a global heap at byte {start}: an object passes its end")
+    return size

@@ -16,10 +16,9 @@ from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
 from stseg.evaluation.sequence import Area
-from stseg.io.toml.text import abbreviated
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.numbers import parse_numbers, parse_whole
+from stseg.io.untrusted.values import abbreviated, parse_numbers, parse_whole
 
 
 def evaluate(

@@ -19,7 +19,7 @@ from stseg.commands.terminal.termination import INTERRUPTED, TERMINATED, Termina
 from stseg.engine.workers.garbage import collect_rarely
 from stseg.errors import ConfigError, StsegError
 from stseg.io.machine import address_space
-from stseg.io.untrusted.names import printable
+from stseg.io.untrusted.values import printable
 from stseg.version import __version__
 
 COMMANDS = {

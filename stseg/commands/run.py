@@ -96,7 +96,7 @@ def run(
     resolved, recording, reporter = read_config(config, set_), read_recording(rig), TerminalReporter()
     receiver = None
     if publish is not None:
-        from stseg.io.live.receivers import receiver_of  # most runs send nothing
+        from stseg.io.live.publishing import receiver_of  # most runs send nothing
 
         receiver = receiver_of(publish)
     if receiver is not None and not follow:

@@ -9,9 +9,8 @@ from cyclopts import Parameter
 
 from stseg.commands.terminal.progress import TerminalReporter
 from stseg.errors import ConfigError
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.numbers import parse_whole
+from stseg.io.untrusted.values import abbreviated, parse_whole
 from stseg.tasks import simulation
 
 

@@ -13,9 +13,15 @@ from stseg.config.foreground import (
     IlluminationConfig,
     MixtureConfig,
 )
-from stseg.config.people import BodyConfig, MotionConfig
 from stseg.config.trackers import BeliefConfig, KalmanConfig, ParticleConfig
-from stseg.config.tracking import LiveConfig, SegmentationConfig, SegmentConfig, TrackingConfig
+from stseg.config.tracking import (
+    BodyConfig,
+    LiveConfig,
+    MotionConfig,
+    SegmentationConfig,
+    SegmentConfig,
+    TrackingConfig,
+)
 
 __all__ = [
     "BackgroundConfig",

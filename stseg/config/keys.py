@@ -1,4 +1,4 @@
-"""Names and descriptions of configuration keys, and which of them are meant for users."""
+"""Keys of the configuration: names, descriptions, which are meant for users, and which have an effect."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from textwrap import dedent
 from typing import Any
 
 from stseg.config import Config
+from stseg.errors import ConfigError
 
 _USER = {
     "body": "height_mean height_spread width_mean width_spread heights box_heights",
@@ -27,6 +28,13 @@ USER_KEYS = frozenset(f"{section}.{name}" for section, names in _USER.items() fo
 
 Those of the background model are named by the default model, and stand for the same ones of the chosen model.
 """
+_PROPOSALS = {
+    "lattice": ("proposals.source",),
+    "volume": ("proposals.source", "proposals.kernel_radius"),
+    "probability": ("proposals.",),
+    "both": ("proposals.",),
+}
+"""Keys that are read with each source of proposals."""
 
 
 def is_user_key(key: str, model: str) -> bool:
@@ -67,3 +75,39 @@ def _descriptions(kind: type) -> dict[str, str]:
                 assert isinstance(text, ast.Expr), f"{base.__name__}.{field.target.id} has no description"
                 described[field.target.id] = " ".join(ast.literal_eval(text.value).split())
     return described
+
+
+def require_effect(config: Config, tracker: str) -> None:
+    """Refuse a value that was changed, but that the chosen model, proposals and tracker do not read.
+
+    Raises
+    ------
+    ConfigError
+        It names the key, and the choice with which it has an effect.
+    """
+    defaults = dict(values(Config()))
+    for key, value in values(config):
+        if value != defaults[key]:
+            for prefix, chosen, needed in _conditions(config, tracker):
+                if key.startswith(prefix) and not key.startswith(chosen):
+                    raise ConfigError("configuration", key, f"a value without effect: {value}", needed)
+
+
+def _conditions(config: Config, tracker: str) -> Iterator[tuple[str, tuple[str, ...], str]]:
+    """Prefixes of keys, those among them that are read, and what the others need."""
+    for model in _tables(config.foreground, "stseg.config.foreground"):
+        chosen = (f"foreground.{config.foreground.model}.",)
+        yield f"foreground.{model}.", chosen, f"foreground.model = {model} beside it, or the default"
+    yield "proposals.", _PROPOSALS[config.proposals.source], "another proposals.source beside it, or the default"
+    for name in _tables(config, "stseg.config.trackers"):
+        yield f"{name}.", (f"{tracker}.",), f"--tracker {name} beside it, or the default"
+    if tracker not in ("cut", "frames"):
+        yield "tracking.return_probability", (), "--tracker cut beside it, or the default"
+    if tracker != "cut":
+        for prefix in ("segmentation.", "tracking.prediction_horizon", "tracking.assignment_distance"):
+            yield prefix, (), "--tracker cut beside it, or the default"
+
+
+def _tables(settings: object, module: str) -> list[str]:
+    """Tables among some settings whose constants are of a module."""
+    return [name for name, value in vars(settings).items() if type(value).__module__ == module]

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 from stseg.config import Config
-from stseg.config.effect import require_effect
+from stseg.config.keys import require_effect
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
@@ -23,8 +23,8 @@ from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.identities.association import NO_KNOWN_PEOPLE
 from stseg.io.config_file import format_config
+from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import StreamIndex, index_streams
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run

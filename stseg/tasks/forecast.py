@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 from stseg.config import Config
-from stseg.config.effect import require_effect
+from stseg.config.keys import require_effect
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
@@ -18,8 +18,8 @@ from stseg.engine.recordings import config_of, recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workers.workforce import Workforce
+from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import index_streams
 from stseg.io.runfile.layout import VolumeKind
 
 _SECONDS = 10.0

@@ -9,8 +9,8 @@ import numpy as np
 
 from stseg.engine.recordings import run_of
 from stseg.io.areas import read_lines, read_polygons
-from stseg.io.exports.measure_tables import write_tables
-from stseg.io.outputs.output_files import make_folder, write_file
+from stseg.io.exports.tables import write_tables
+from stseg.io.outputs.whole_files import make_folder, write_file
 from stseg.io.runfile.runs import Run
 from stseg.measures.areas import Areas, Line, Zone
 from stseg.measures.measure import Measures, measure_tracks

@@ -15,9 +15,8 @@ from stseg.engine.recordings import run_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
-from stseg.io.outputs.output_files import make_folder, write_file, write_page
 from stseg.io.outputs.video_writer import require_film_name, write_film
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import make_folder, require_new, write_file, write_page
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run

@@ -9,8 +9,7 @@ import numpy as np
 
 from stseg.arrays import Observation
 from stseg.identities.review.doubts import Doubt
-from stseg.io.outputs.output_files import write_page
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import require_new, write_page
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run, read_run
 from stseg.reporting.page.review_page import Question, best_views, moment_picture, review_page

@@ -12,8 +12,8 @@ from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
+from stseg.io.untrusted.values import abbreviated
 from stseg.simulation import NAMED, SceneFilm, SceneSpec, Spoil, SpoiledFilm
 from stseg.simulation.spoiling.spoil import STRENGTHS
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import ConfigError
-from stseg.io.outputs.output_files import write_file
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import require_new, write_file
 from stseg.io.runfile.runs import Run
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.slices import marginal_picture, plane_picture

@@ -12,7 +12,7 @@ import numpy as np
 from stseg.arrays import Bytes, Flags, Floats, Observation
 from stseg.geometry import Camera, Grid
 from stseg.io.detections.source_detections import SourceDetections, read_source
-from stseg.io.outputs.output_files import make_folder, write_file
+from stseg.io.outputs.whole_files import make_folder, write_file
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.image_stream import is_detection_file
 from stseg.io.recording.recording import CameraSource, Recording

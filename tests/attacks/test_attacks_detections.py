@@ -12,9 +12,8 @@ from attacks import SECONDS
 
 from stseg.errors import FormatError
 from stseg.io.answers import read_answers, read_names
-from stseg.io.detections.frame_names import last_numbers
 from stseg.io.detections.masks import RunLengths, polygons, run_lengths
-from stseg.io.detections.record import Detections
+from stseg.io.detections.record import Detections, last_numbers
 from stseg.io.detections.source_detections import instance_image, read_source
 from stseg.io.recording.recording import Source
 

@@ -16,7 +16,7 @@ from stseg.commands.main import main
 from stseg.errors import InputError
 from stseg.io.recording.rigs import parse_rig, read_recording
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
-from stseg.io.untrusted.names import is_name
+from stseg.io.untrusted.values import is_name
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def test_notes_of_another_form_are_refused(tmp_path: Path, content: str) -> None
 def test_damaged_time_stamps_are_made_anew(tmp_path: Path) -> None:
     recording = read_recording(write_rig(tmp_path))
     with WorkFolder(tmp_path / "q.h5", {}) as work:
-        from stseg.io.recording.stream_index import index_streams
+        from stseg.io.recording.aligned_stream import index_streams
 
         work.keep_streams(index_streams(recording))
         path = work.path / "streams.npz"

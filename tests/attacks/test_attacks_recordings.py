@@ -15,8 +15,8 @@ from attacks import film, refusal, write_rig
 from stseg.errors import InputError, SourceError
 from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.rigs import read_recording
+from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.io.recording.video.packets import PictureHeads
-from stseg.io.recording.video.video_size import read_video_size
 
 
 @pytest.mark.parametrize("name", ["2026-01-01T10:30:00.avi", "http:127.0.0.1:9701", "concat:a", "-", "a%03d.avi"])

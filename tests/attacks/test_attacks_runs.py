@@ -15,7 +15,7 @@ from run_files import write_small_run
 
 from stseg.errors import FormatError
 from stseg.io.runfile.runs import read_run
-from stseg.io.untrusted import global_heaps, safe_hdf5
+from stseg.io.untrusted import safe_hdf5
 
 
 @pytest.fixture
@@ -164,9 +164,9 @@ def test_heaps_are_found_astride_of_blocks(run_file: Path, monkeypatch: pytest.M
     contents = run_file.read_bytes()
     expected = [place for place in range(len(contents)) if contents.startswith(b"GCOL\x01\0\0\0", place)]
     for block in (9, 100, 901):
-        monkeypatch.setattr(global_heaps, "_BLOCK", block)
+        monkeypatch.setattr(safe_hdf5, "_BLOCK", block)
         with run_file.open("rb") as file:
-            assert list(global_heaps._collections(file)) == expected
+            assert list(safe_hdf5._collections(file)) == expected
 
 
 def test_a_file_is_examined_once_and_again_when_it_has_changed(run_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,9 +13,8 @@ from fuzz.targets import TARGETS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stseg.io.toml.text import abbreviated, parse_toml
-from stseg.io.untrusted.names import is_name, printable
-from stseg.io.untrusted.numbers import parse_number, parse_whole
+from stseg.io.toml.text import parse_toml
+from stseg.io.untrusted.values import abbreviated, is_name, parse_number, parse_whole, printable
 
 FILES = 60
 """Mutated files of each target."""

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from stseg.commands.main import main
 from stseg.config import BodyConfig, Config
-from stseg.config.effect import require_effect
-from stseg.config.keys import USER_KEYS, describe, values
+from stseg.config.keys import USER_KEYS, describe, require_effect, values
 from stseg.config.ranges import require
 from stseg.errors import ConfigError
 from stseg.io.config_file import describe_config, format_config, read_config

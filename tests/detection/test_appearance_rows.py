@@ -12,7 +12,7 @@ from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence
 from stseg.bodies.pillars import BodyTable
 from stseg.detection.appearance import appearance_rows
 from stseg.errors import FormatError, SourceError
-from stseg.io.recording.appearance_axes import appearance_axes
+from stseg.io.detections.source_detections import appearance_axes
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig

@@ -26,8 +26,8 @@ from stseg.engine.live.following import ENDLESS, last_frame
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
-from stseg.io.live.correction_table import CorrectionTable
 from stseg.io.live.followed_cameras import FollowedCameras
+from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.kernels.accelerate import python_form

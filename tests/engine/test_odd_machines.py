@@ -25,8 +25,8 @@ from stseg.io.outputs.whole_files import create_part, replacing
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.reading.run_reader import read_run
-from stseg.io.runfile.unfinished import locks
-from stseg.io.untrusted.names import printable
+from stseg.io.runfile.unfinished import part_file
+from stseg.io.untrusted.values import printable
 from stseg.kernels.accelerate import python_form
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")
@@ -92,7 +92,7 @@ def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.
         raise OSError(code, os.strerror(code))
 
     monkeypatch.setattr(h5py.File, "__init__", without_locks)
-    monkeypatch.setattr(locks, "flock", refused)
+    monkeypatch.setattr(part_file, "flock", refused)
     assert track(rig, tmp_path / "run.h5", "--frames", "0:8") == 0
     (tmp_path / "answers.csv").write_text("action,frame,id,other,name\nname,,1,,Ann\n")
     for arguments in (("export", "--to", "csv"), ("correct", str(tmp_path / "answers.csv"))):

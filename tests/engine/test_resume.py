@@ -19,7 +19,7 @@ from scenes import walkers
 from stseg.detection.score.scoring import set_score
 from stseg.evaluation import evaluate
 from stseg.io.runfile.runs import read_run
-from stseg.io.runfile.unfinished.segment_files import checksum
+from stseg.io.runfile.unfinished.work_files import checksum
 from stseg.kernels.accelerate import python_form
 
 PROGRAM = """

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from stseg.io.outputs.whole_files import replacing
-from stseg.io.recording.indexed_png import encode_indexed
+from stseg.io.recording.pictures import encode_indexed
 
 RIG = b"""format = 1
 [scene]

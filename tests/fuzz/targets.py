@@ -28,8 +28,7 @@ from stseg.io.calibrations.point_files import read_points
 from stseg.io.config_file import read_config
 from stseg.io.exports import formats as exports
 from stseg.io.live.arriving_files import FileNotes
-from stseg.io.live.correction_table import CorrectionTable
-from stseg.io.live.live_table import LiveTable
+from stseg.io.live.live_tables import CorrectionTable, LiveTable
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.recording import Source

@@ -18,7 +18,7 @@ from stseg.arrays import Rows
 from stseg.config import Config, LiveConfig
 from stseg.errors import ConfigError
 from stseg.geometry.grid import Grid
-from stseg.io.live.correction_table import CorrectionTable
+from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.live.publishing import Publisher
 from stseg.records.border import Border
 from stseg.records.tables import APPEARANCE, CORRECTION, TRAJECTORY

@@ -20,8 +20,7 @@ from stseg.commands.calibrate.app import app
 from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
 from stseg.geometry import Camera
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
-from stseg.io.calibrations.pom import read_pom
-from stseg.io.calibrations.projection import read_projection
+from stseg.io.calibrations.matrices import read_pom, read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, median_height, require_height

@@ -17,8 +17,8 @@ from stseg.commands.calibrate.app import app
 from stseg.errors import CalibrationError, ConfigError, FormatError, OutputError, RigError
 from stseg.geometry import Camera
 from stseg.io.calibrations.foreign_camera import ForeignCamera
+from stseg.io.calibrations.matrices import read_projection
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
-from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.world_frame import Up, World
 from stseg.io.recording.rigs import read_recording
 

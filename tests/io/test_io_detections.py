@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from stseg.errors import FormatError, InputError, RigError, SourceError
-from stseg.io.detections.frame_names import listed_frames
 from stseg.io.detections.masks import flat_polygons, run_lengths
+from stseg.io.detections.record import listed_frames
 from stseg.io.detections.source_detections import read_source
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream

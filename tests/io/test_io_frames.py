@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError, StsegError
 from stseg.geometry import Camera, Grid, Rig
+from stseg.io.recording.aligned_stream import StreamIndex, count_frames, index_streams
 from stseg.io.recording.frames import FrameSet, open_frames, read_background, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
-from stseg.io.recording.stream_index import StreamIndex, count_frames, index_streams
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 SIZE = (16, 12)

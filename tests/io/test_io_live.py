@@ -20,13 +20,12 @@ from stseg.geometry import Rig
 from stseg.io.live.arriving_files import ArrivingFiles, FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
-from stseg.io.live.live_frames import LiveFrameSet, is_live, now
-from stseg.io.live.live_stream import Capture
+from stseg.io.live.live_stream import Capture, LiveFrameSet, is_live, now
+from stseg.io.recording.aligned_stream import count_frames
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig, read_recording
-from stseg.io.recording.stream_index import count_frames
 from stseg.io.recording.video.video_stream import VideoStream
 from stseg.io.runfile.provenance import gather_provenance
 

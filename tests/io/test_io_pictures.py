@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Bytes
 from stseg.errors import SourceError
 from stseg.io.recording.image_stream import image_paths
-from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
-from stseg.io.recording.pictures import read_picture
+from stseg.io.recording.pictures import decode_indexed, read_picture, stores_numbers
 from stseg.io.recording.recording import SourceKind
 
 GREY, INDEXED = 0, 3

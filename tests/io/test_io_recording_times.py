@@ -16,9 +16,9 @@ from stseg.config import Config, SegmentConfig
 from stseg.detection.score.scoring import set_score
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.geometry import Camera, Grid, Rig
+from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.frames import read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.stream_index import index_streams
 from stseg.io.runfile.runs import Run, read_run
 from stseg.kernels.accelerate import python_form
 

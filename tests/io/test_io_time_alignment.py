@@ -16,10 +16,10 @@ from stseg.arrays import Boxes, Bytes, Floats, Ints, Observation
 from stseg.engine.offline.segments import find_gaps
 from stseg.errors import RigError, SourceError
 from stseg.geometry import Camera, Grid, Rig
+from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import read_recording, write_rig
-from stseg.io.recording.stream_index import StreamIndex, index_streams
 from stseg.io.recording.time_alignment import TimeAlignment, align_in_time, coverage, nearest_frames, with_alignment
 from stseg.io.recording.video.time_stamps import concatenate_files, interpret_stamps
 from stseg.io.runfile.provenance import gather_provenance

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stseg.io.untrusted.numbers import parse_number, parse_whole
+from stseg.io.untrusted.values import parse_number, parse_whole
 
 
 @pytest.mark.parametrize("text", ["1_000", "٣", "inf", "nan", "1e999", "0x1", "", " ", "1" * 500, "1e", "--1"])

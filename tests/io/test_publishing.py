@@ -20,8 +20,7 @@ import pytest
 from stseg.arrays import Rows
 from stseg.commands.main import main
 from stseg.errors import ConfigError
-from stseg.io.live.publishing import Publisher
-from stseg.io.live.receivers import receiver_of
+from stseg.io.live.publishing import Publisher, receiver_of
 from stseg.records.tables import TRAJECTORY
 
 

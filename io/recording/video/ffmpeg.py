@@ -14,12 +14,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
+from stseg.errors import SourceError
+
 # Silences FFmpeg, which reads this at its first use; failures raise SourceError instead.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
 
-from stseg.errors import SourceError
 from stseg.io.untrusted import limits
 
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
@@ -90,3 +91,21 @@ def _is_text(head: bytes) -> bool:
     printable = set(range(0x20, 0x7F)) | {0x09, 0x0A, 0x0D}
     head = head.removeprefix(b"\xef\xbb\xbf")
     return bool(head) and not head.startswith(_TEXT_VIDEO) and set(head) <= printable
+
+
+def read_video_size(path: Path) -> tuple[int, int]:
+    """Width and height of a video's first frame, pixels.
+
+    Raises
+    ------
+    SourceError
+        Where the file is missing or nothing of it decodes.
+    """
+    capture = open_video(path, "")
+    try:
+        decoded, picture = capture.read()
+    finally:
+        capture.release()
+    if not decoded:
+        raise SourceError(path, "", "no frame that decodes", "a video that FFmpeg decodes")
+    return int(picture.shape[1]), int(picture.shape[0])

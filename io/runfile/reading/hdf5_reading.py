@@ -1,19 +1,27 @@
-"""Reading of HDF5 files, with the errors of h5py as errors of the format."""
+"""Reading of HDF5 files from outside, texts and attributes among it, with the errors of h5py as errors of the format.
+
+A text of any length is a reference of 16 bytes into a global heap, with the text's length. HDF5 takes memory for that
+length, up to 4 GiB, before it looks into the heap; so memory is bounded while one is read.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import h5py
 
+from stseg.arrays import AnyArray
 from stseg.errors import FormatError
-from stseg.io.untrusted.names import printable
+from stseg.io.machine import bounded_growth
 from stseg.io.untrusted.safe_hdf5 import open_hdf5
+from stseg.io.untrusted.values import printable
 
 T = TypeVar("T")
+_GROWTH = 1 << 30
+"""Bytes: texts have at most 2^24, and threads beside want some."""
 
 
 def read_object(path: Path, place: str, take: Callable[[h5py.File], T]) -> T:
@@ -38,3 +46,24 @@ def format_errors(path: Path, place: str) -> Iterator[None]:
             raise FormatError(path, "", "something that is not HDF5", "a run file") from error
         found = f"something that cannot be read ({printable(str(error))[:200]})"
         raise FormatError(path, place, found, "a whole run file") from error
+
+
+def read_text(dataset: h5py.Dataset) -> str:
+    """A single text, with bytes that are no UTF-8 escaped; ValueError where it is none."""
+    with bounded_growth(_GROWTH):
+        text = dataset.asstr(errors="surrogateescape")[()]
+    if not isinstance(text, str):
+        raise ValueError(f"{dataset.name}: no text")
+    return text
+
+
+def read_texts(dataset: h5py.Dataset) -> AnyArray:
+    """Texts, str objects in the dataset's shape; raises what h5py raises where it holds others."""
+    with bounded_growth(_GROWTH):
+        return dataset.asstr()[()]  # type: ignore[no-any-return]
+
+
+def read_attribute(owner: h5py.Group | h5py.Dataset, key: str) -> Any:
+    """An attribute as h5py gives it; KeyError where there is none."""
+    with bounded_growth(_GROWTH):
+        return owner.attrs[key]

@@ -11,8 +11,8 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.io.runfile import layout
+from stseg.io.runfile.reading.hdf5_reading import read_attribute
 from stseg.io.runfile.reading.run_reader import Run, read_run
-from stseg.io.runfile.reading.texts import read_attribute
 from stseg.io.untrusted.safe_hdf5 import hdf5_file, open_hdf5
 
 Layer = tuple[Any, dict[str, Any], str]

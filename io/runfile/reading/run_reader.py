@@ -13,6 +13,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
+from stseg.geometry import Grid
 from stseg.io.extras import load_extra
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
@@ -20,19 +21,13 @@ from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, PackedFrames
 from stseg.io.runfile.provenance import Provenance, read_provenance
-from stseg.io.runfile.reading.cell_probability import learn_reliability
-from stseg.io.runfile.reading.data_frames import to_data_frame
-from stseg.io.runfile.reading.hdf5_reading import format_errors, read_object
-from stseg.io.runfile.reading.layout_checks import LayoutChecks, require_bounded_volume
-from stseg.io.runfile.reading.texts import read_attribute, read_texts
-from stseg.io.runfile.reading.value_checks import Bounds, require_fit, require_table
-from stseg.io.runfile.reading.volume import RunVolume
-from stseg.io.toml.text import abbreviated
+from stseg.io.runfile.reading.checks import Bounds, LayoutChecks, require_bounded_volume, require_fit, require_table
+from stseg.io.runfile.reading.hdf5_reading import format_errors, read_attribute, read_object, read_texts
+from stseg.io.runfile.reading.run_arrays import RunVolume, to_data_frame
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.names import EXPECTED_TITLE, is_title, printable
-from stseg.io.untrusted.numbers import parse_whole
 from stseg.io.untrusted.safe_hdf5 import open_hdf5, read_whole
-from stseg.records.cell_reliability import CellReliability
+from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, parse_whole, printable
+from stseg.records.cell_reliability import CellCounts, CellReliability, count_cells, doubtful_cells, filled_cells
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -40,6 +35,8 @@ if TYPE_CHECKING:
 
 _SCALES = 8 * limits.FRAMES
 """Bytes of one scale of the volume."""
+_FRAMES = 48
+"""Frames that the curve is learned from, spread over the run: they hold some 10^5 cells in doubt."""
 
 
 @dataclass(frozen=True)
@@ -345,3 +342,16 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
         raise FormatError(path, f"{layout.OCCUPANCY}@kept", abbreviated(kept), f"one of {', '.join(layout.VOLUMES)}")
     title = printable(str(read_texts(entry)))[: limits.NAME]
     return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))
+
+
+def learn_reliability(run: Run) -> CellReliability:
+    """The curve of a run, from frames spread over it; raises FormatError as reading does."""
+    chosen = np.unique(np.linspace(0, len(run.frames), _FRAMES, endpoint=False).astype(int))
+    grid, rows = run.recording.rig.grid, run.trajectory
+    return CellReliability.of(_counts(run, grid, rows, frame) for frame in run.frames[chosen[chosen < len(run.frames)]])
+
+
+def _counts(run: Run, grid: Grid, rows: Rows, frame: int) -> CellCounts:
+    log_odds, _ = run.read_frame(int(frame))
+    frame_rows = rows[rows["frame"] == frame]
+    return count_cells(log_odds, filled_cells(grid, frame_rows), doubtful_cells(grid, log_odds, frame_rows))

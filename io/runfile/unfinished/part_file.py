@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
+from typing import IO
 
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import create_part, output_error, parts_of, publish_part
-from stseg.io.runfile.unfinished.locks import lock
 
 _Handler = Callable[[int, FrameType | None], object]
 
@@ -188,3 +188,21 @@ def _remove_abandoned(path: Path) -> None:
         with part.open("rb") as file:
             lock(file)
             part.unlink()
+
+
+try:
+    from fcntl import LOCK_EX, LOCK_NB, flock
+except ImportError:  # Windows has no such locks: two runs into one file go unnoticed there
+
+    def lock(file: IO[bytes]) -> None:
+        """Hold a file until it is closed; BlockingIOError where another process holds it."""
+else:
+
+    def lock(file: IO[bytes]) -> None:
+        """Hold a file until it is closed; BlockingIOError where another process holds it."""
+        try:
+            flock(file, LOCK_EX | LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:
+            pass  # a file system without locks

@@ -20,21 +20,25 @@ import os
 import re
 import secrets
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import create_part, output_error, publish_part, replacing, require_new, sync_folder
+from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import StreamIndex
-from stseg.io.runfile.unfinished.locks import lock
-from stseg.io.runfile.unfinished.request_differences import differences
-from stseg.io.runfile.unfinished.segment_files import FinishedSegments, finished_segments
-from stseg.io.runfile.unfinished.stream_times import read_stream_times, write_stream_times
-from stseg.io.toml.text import abbreviated
+from stseg.io.runfile.unfinished.part_file import lock
+from stseg.io.runfile.unfinished.work_files import (
+    FinishedSegments,
+    finished_segments,
+    read_stream_times,
+    write_stream_times,
+)
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import is_regular, parse_json, read_text
+from stseg.io.untrusted.values import abbreviated, printable
 
 _MARK = "stseg-work-folder"
 _STREAMS = "streams.npz"
@@ -268,3 +272,36 @@ def _open_own(path: Path) -> BinaryIO:
     """A file of ours, made where there is none; links are not followed."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
     return os.fdopen(os.open(path, flags, 0o666), "r+b")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A difference between two requests.
+
+    Attributes
+    ----------
+    key
+        The differing key.
+    now, begun
+        Its value in the present request and in that of the unfinished run.
+    """
+
+    key: str
+    now: str
+    begun: str
+
+
+def differences(now: dict[str, Any], begun: dict[str, Any], prefix: str = "") -> list[Difference]:
+    """All differences of two nested tables."""
+    found = []
+    for key in (*now, *(key for key in begun if key not in now)):
+        a, b, name = now.get(key, "nothing"), begun.get(key, "nothing"), f"{prefix}{key}"
+        if isinstance(a, dict) and isinstance(b, dict):
+            found += differences(a, b, f"{name}.")
+        elif a != b:
+            found.append(Difference(name, _value(a), _value(b)))
+    return found
+
+
+def _value(value: object) -> str:
+    return printable(value[: limits.NAME]) if isinstance(value, str) else abbreviated(value)

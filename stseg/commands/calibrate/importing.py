@@ -19,7 +19,7 @@ from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, gues
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
-from stseg.io.toml.text import one_of
+from stseg.io.untrusted.values import one_of
 
 
 def import_calibration(

@@ -16,7 +16,7 @@ from stseg.io.calibrations.opencv_xml import write_opencv_lens
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
-from stseg.io.recording.video.video_size import read_video_size
+from stseg.io.recording.video.ffmpeg import read_video_size
 
 _UNIT_CAMERA = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _WORTH = 0.02

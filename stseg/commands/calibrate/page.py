@@ -12,13 +12,12 @@ from stseg.arrays import Bytes
 from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
-from stseg.io.outputs.output_files import write_page
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import require_new, write_page
 from stseg.io.recording.image_stream import is_image_source
 from stseg.io.recording.pictures import read_colour
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
-from stseg.io.recording.video.video_size import read_video_size
+from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.reporting.page.calibration_page import FloorPlan, calibration_page
 
 _UNIT_CAMERA = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])

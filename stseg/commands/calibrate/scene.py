@@ -13,9 +13,8 @@ from cyclopts import Parameter
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.io.recording.recording import CameraSource, Source, SourceKind
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.numbers import parse_numbers
+from stseg.io.untrusted.values import abbreviated, parse_numbers
 
 
 @Parameter(name="*")

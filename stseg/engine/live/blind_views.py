@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io.live.live_frames import LiveFrameSet
+from stseg.io.live.live_stream import LiveFrameSet
 from stseg.records.tables import EVENT
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import Event
 
 from stseg.config import Config
-from stseg.config.effect import require_effect
+from stseg.config.keys import require_effect
 from stseg.engine.live.live_foreground import LiveForegrounds
 from stseg.engine.live.live_run import LiveRun
 from stseg.engine.offline.assembly import FinishedSegment, assemble
@@ -25,16 +25,14 @@ from stseg.engine.track import resumable
 from stseg.errors import ConfigError, SourceError
 from stseg.io.config_file import format_config
 from stseg.io.live.arriving_files import FileNotes
-from stseg.io.live.correction_table import CorrectionTable
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
-from stseg.io.live.live_frames import LiveFrameSet, is_live
-from stseg.io.live.live_table import LiveTable
-from stseg.io.live.publishing import Publisher
-from stseg.io.live.receivers import Receiver
+from stseg.io.live.live_stream import LiveFrameSet, is_live
+from stseg.io.live.live_tables import CorrectionTable, LiveTable
+from stseg.io.live.publishing import Publisher, Receiver
 from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run

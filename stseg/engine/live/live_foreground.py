@@ -17,7 +17,7 @@ from stseg.engine.offline.backgrounds import BackgroundLearner, empty_background
 from stseg.foreground.background.model import Background
 from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.io.live.live_frames import LiveFrameSet
+from stseg.io.live.live_stream import LiveFrameSet
 from stseg.io.recording.recording import Recording
 
 

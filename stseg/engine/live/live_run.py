@@ -21,9 +21,8 @@ from stseg.engine.live.open_segment import OpenSegment
 from stseg.engine.offline.assembly import FinishedSegment
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
-from stseg.io.live.correction_table import CorrectionTable
-from stseg.io.live.live_frames import LiveFrameSet, now
-from stseg.io.live.live_table import LiveTable
+from stseg.io.live.live_stream import LiveFrameSet, now
+from stseg.io.live.live_tables import CorrectionTable, LiveTable
 from stseg.io.live.publishing import Publisher
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.records.border import Border

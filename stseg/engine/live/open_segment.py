@@ -14,7 +14,7 @@ from stseg.engine.offline.segments import Segment
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import Session
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.io.live.live_frames import LiveFrameSet
+from stseg.io.live.live_stream import LiveFrameSet
 from stseg.trajectories.live_ids import Names
 
 

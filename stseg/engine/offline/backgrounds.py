@@ -20,9 +20,9 @@ from stseg.foreground import make_background
 from stseg.foreground.background.model import Background
 from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.frames import read_background, read_camera
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import StreamIndex
 
 _Frames = TypeVar("_Frames", range, Sequence[int])
 
@@ -66,7 +66,7 @@ def make_foregrounds(
     segment
         The segment to process; by default all frames of the run, without a warm-up.
     streams
-        From `stseg.io.recording.stream_index.index_streams`, to seek distant frames.
+        From `stseg.io.recording.aligned_stream.index_streams`, to seek distant frames.
 
     Returns
     -------

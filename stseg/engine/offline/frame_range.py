@@ -6,12 +6,11 @@ from typing import NamedTuple
 
 from stseg.arrays import Ints
 from stseg.errors import ConfigError
+from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.runs import Run
-from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.numbers import parse_whole
+from stseg.io.untrusted.values import abbreviated, parse_whole
 
 
 class FrameRange(NamedTuple):

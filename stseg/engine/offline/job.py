@@ -10,9 +10,9 @@ from stseg.config import Config
 from stseg.engine.offline.segments import Segment, find_gaps, longest_absence, segments
 from stseg.engine.pipeline import Pipeline, decides_by_appearance
 from stseg.identities.association import NO_KNOWN_PEOPLE
-from stseg.io.recording.appearance_axes import appearance_axes
+from stseg.io.detections.source_detections import appearance_axes
+from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.layout import VolumeKind
 from stseg.trackers import find_tracker
 
@@ -30,7 +30,7 @@ class Job:
     first, stop
         The frames of the run, half open.
     streams
-        Lengths and frame times of the streams (`stseg.io.recording.stream_index`).
+        Lengths and frame times of the streams (`stseg.io.recording.aligned_stream`).
     known : KNOWN_PERSON (k,)
         People of earlier recordings.
     """

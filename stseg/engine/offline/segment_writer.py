@@ -22,7 +22,7 @@ from stseg.io.runfile.layout import ghost_type
 from stseg.io.runfile.packed_frames import PackedFrame
 from stseg.io.runfile.run_writer import packed_volume
 from stseg.io.runfile.runs import RunWriter
-from stseg.io.runfile.unfinished.segment_files import keep_segment
+from stseg.io.runfile.unfinished.work_files import keep_segment
 from stseg.records.tables import EVENT, TRACK
 
 _VOLUME_RADIUS = 1.0

@@ -30,11 +30,11 @@ from stseg.errors import ConfigError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import write_rig
-from stseg.io.recording.stream_index import StreamIndex, index_streams
-from stseg.io.recording.video.video_size import read_video_size
+from stseg.io.recording.video.ffmpeg import read_video_size
 
 Distance = tuple[str, float, float, float, float, float]
 """A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""

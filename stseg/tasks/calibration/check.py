@@ -18,7 +18,7 @@ from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.recordings import recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
-from stseg.io.outputs.output_files import make_folder, write_file, write_page
+from stseg.io.outputs.whole_files import make_folder, write_file, write_page
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.reporting.figures import Figure, backdrop

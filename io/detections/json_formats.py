@@ -1,4 +1,9 @@
-"""COCO JSON: results of a detector (a list, which Detectron2 and `yolo val` write, too), and annotated data sets."""
+"""Detectors and data sets in JSON: COCO, MMDetection, WILDTRACK and MultiviewX.
+
+COCO: results of a detector (a list, which Detectron2 and `yolo val` write, too), and annotated data sets. MMDetection:
+the output of `DetInferencer`, one file an image (its folder `preds`), or a list of them. WILDTRACK: a folder of JSON,
+one file a frame, each with the boxes of all views.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +16,10 @@ import numpy as np
 
 from stseg.arrays import Ints
 from stseg.errors import FormatError, SourceError
-from stseg.io.detections.frame_names import listed_frames
-from stseg.io.detections.json_files import read_json, require
 from stseg.io.detections.masks import Mask, flat_polygons, run_lengths
-from stseg.io.detections.record import DetectionList, Detections, Request
+from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, read_json, require
+
+_KEYS = ("xmin", "ymin", "xmax", "ymax")
 
 
 def is_results(data: Any) -> bool:
@@ -112,3 +117,64 @@ def _mask(path: Path, place: str, segmentation: Any) -> Mask | None:
         return flat_polygons(segmentation)
     except (ValueError, TypeError, KeyError) as error:
         raise FormatError(path, place, f"a segmentation: {error}"[:100], "polygons, or run lengths") from error
+
+
+def is_prediction(data: Any) -> bool:
+    """Whether parsed JSON is the prediction of one image."""
+    return isinstance(data, dict) and {"labels", "scores", "bboxes"} <= set(data)
+
+
+def is_mmdetection(data: Any) -> bool:
+    """Whether parsed JSON is a list of predictions, or the inferencer's dictionary around it."""
+    rows = data.get("predictions") if isinstance(data, dict) else data
+    return isinstance(rows, list) and bool(rows) and all(map(is_prediction, rows))
+
+
+def read_mmdetection(request: Request, data: Any) -> Detections:
+    """Detections of a list of predictions, one a frame."""
+    rows = data["predictions"] if isinstance(data, dict) else data
+    found = DetectionList(request.path)
+    for frame, row in enumerate(rows):
+        _add(request, found, f"frame {frame}", frame, row)
+    return found.done(len(rows))
+
+
+def _add(request: Request, found: DetectionList, place: str, frame: int, row: Any) -> None:
+    boxes, scores, labels = (require(request.path, place, row, key) for key in ("bboxes", "scores", "labels"))
+    masks = row.get("masks") or [None] * len(boxes)
+    if not len(boxes) == len(scores) == len(labels) == len(masks):
+        raise FormatError(request.path, place, "bboxes, scores, labels and masks of different lengths", "one each")
+    for corners, score, label, mask in zip(boxes, scores, labels, masks, strict=True):
+        try:
+            drawn = None if mask is None else run_lengths(mask["size"], mask["counts"])
+        except (ValueError, TypeError, KeyError) as error:
+            raise FormatError(request.path, place, f"a mask: {error}"[:100], "run lengths as COCO's") from error
+        found.add_corners(place, frame, corners, score, str(label), drawn)
+
+
+def is_wildtrack(data: Any) -> bool:
+    """Whether parsed JSON is one frame of annotations."""
+    return isinstance(data, list) and bool(data) and isinstance(data[0], dict) and {"personID", "views"} <= set(data[0])
+
+
+def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Detections:
+    """Boxes of one view; -1 marks a person that the view does not show."""
+    if request.view is None:
+        raise FormatError(request.path, "view", "no number of the camera", "view = NUMBER in the rig's source, from 0")
+    frames, count = listed_frames([path.name for path in paths])
+    found, has_view = DetectionList(request.path), False
+    for path, frame, people in zip(paths, frames.tolist(), data, strict=True):
+        for index, person in enumerate(people):
+            place = f"{path.name}, person {index}"
+            for view in require(request.path, place, person, "views"):
+                if require(request.path, place, view, "viewNum") != request.view:
+                    continue
+                has_view = True
+                corners = [require(request.path, place, view, key) for key in _KEYS]
+                if corners != [-1, -1, -1, -1]:
+                    found.add_corners(place, frame, corners, label="person")
+    if not has_view:
+        raise FormatError(
+            request.path, f"view {request.view}", "no such viewNum", "the camera's number in the files: view"
+        )
+    return found.done(count)

@@ -1,0 +1,131 @@
+"""Single values from outside: names checked once for all uses, text that becomes numbers, values as errors show them.
+
+Form, digits, finiteness and range of a number are checked before it is used; a caller names file and key.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from reprlib import Repr
+
+import numpy as np
+
+from stseg.errors import OutputError
+from stseg.io.untrusted import limits
+
+_LONGEST_VALUE = 60
+"""Characters of a value in an error."""
+_REPR = Repr()
+_REPR.maxlevel, _REPR.maxlist, _REPR.maxdict = 2, 8, 4
+_REPR.maxstring = _REPR.maxother = _LONGEST_VALUE
+_FORBIDDEN = frozenset("/\\")
+EXPECTED = f"a name of 1 to {limits.NAME} printable characters, without slashes, that a file can have"
+EXPECTED_TITLE = f"a name of 1 to {limits.NAME} printable characters"
+_LONGEST_NUMBER = 400
+"""Characters of a number: the longest that Python itself writes has 326."""
+_NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,5})?\s*", re.ASCII)
+_WHOLE_NUMBER = re.compile(r"\s*[+-]?\d{1,18}\s*", re.ASCII)
+
+
+def is_name(text: object) -> bool:
+    """Whether a text is printable and can be a file's name; control and direction marks are not printable."""
+    return (
+        isinstance(text, str)
+        and 0 < len(text) <= limits.NAME
+        and len(text.encode("utf-8", "replace")) <= limits.PATH_PART - len("_instances.toml")
+        and text.isprintable()
+        and text == text.strip()
+        and text.strip(".") != ""
+        and not _FORBIDDEN & set(text)
+    )
+
+
+def is_title(text: object) -> bool:
+    """Whether a text can name a track, a zone or a line: printable, and neither empty nor long."""
+    return isinstance(text, str) and 0 < len(text) <= limits.NAME and text.isprintable() and text == text.strip()
+
+
+def is_file_name(text: object) -> bool:
+    """Whether a text names a file within a folder, and never a place outside of it."""
+    return isinstance(text, str) and is_path(text) and "/" not in text and text not in (".", "..")
+
+
+def is_path(text: str) -> bool:
+    """Whether a text can be a path: not too long, and without NUL."""
+    data = text.encode("utf-8", "surrogateescape")
+    return (
+        0 < len(data) <= limits.PATH
+        and b"\0" not in data
+        and all(len(part) <= limits.PATH_PART for part in data.split(b"/"))
+    )
+
+
+def require_utf8(path: Path, purpose: str) -> None:
+    """Refuse an output at a path that is no UTF-8, where a library cannot write there; raises OutputError."""
+    try:
+        str(path.absolute()).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise OutputError(path, "", "a path that is no UTF-8", f"one that is, for {purpose}") from error
+
+
+def printable(text: str) -> str:
+    """A text for the terminal: control characters, and bytes that are no UTF-8, as escapes."""
+    return "".join(
+        character if character.isprintable() else character.encode("unicode_escape").decode() for character in text
+    )
+
+
+def parse_number(text: str) -> float:
+    """A finite decimal number from text; nan for anything else.
+
+    Unlike `float`, neither underscores, digits of other scripts, nor words such as `infinity` are numbers.
+    """
+    if len(text) > _LONGEST_NUMBER or _NUMBER.fullmatch(text) is None:
+        return math.nan
+    number = float(text)
+    return number if math.isfinite(number) else math.nan
+
+
+def parse_whole(text: str, low: int, high: int) -> int | None:
+    """A whole number within [low, high] from text; None for anything else."""
+    if _WHOLE_NUMBER.fullmatch(text) is None:
+        return None
+    number = int(text)
+    return number if low <= number <= high else None
+
+
+def parse_numbers(words: Sequence[str], largest: float = limits.NUMBER) -> list[float] | None:
+    """Finite numbers no larger than `largest` in size; None where one of them is none."""
+    numbers = [parse_number(word) for word in words]
+    return numbers if all(abs(number) <= largest for number in numbers) else None
+
+
+def finite_number(value: object, largest: float = math.inf) -> float | None:
+    """A value of TOML, JSON or YAML as a finite float, no larger than `largest` in size; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:  # an int beyond the floats
+        return None
+    return number if math.isfinite(number) and abs(number) <= largest else None
+
+
+def one_of(name: object, names: Iterable[str]) -> str:
+    """Expectation of an error in place of an unknown name: all names, and the one most like it."""
+    names = tuple(names)
+    close = get_close_matches(str(name)[:_LONGEST_VALUE], names, 1)
+    return f"one of {', '.join(names)}" + (f"; did you mean {close[0]}?" if close else "")
+
+
+def abbreviated(value: object) -> str:
+    """A value as an error shows it: what Python writes, cut to one line; nested values are never written out."""
+    try:
+        text = _REPR.repr(value.item() if isinstance(value, np.number) else value)
+    except ValueError:  # an int of more digits than Python converts
+        return "a number of thousands of digits"
+    return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
