@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock
 
-from stseg.arrays import Observation
+from stseg.arrays import Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.live.live_stream import now
@@ -175,6 +175,10 @@ class ArrivingVideos:
                 return view
             self._end()
         return None
+
+    def times(self) -> list[Floats]:
+        """Time stamps of files that have not arrived are unknown: there are none."""
+        return []
 
     def close(self) -> None:
         """Close what is open."""

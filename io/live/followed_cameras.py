@@ -12,16 +12,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from itertools import count
 from math import ceil
 from threading import Condition, Event, Thread
-from types import TracebackType
 from typing import Self
 
 from stseg.arrays import Observation
 from stseg.config import LiveConfig
-from stseg.io.live.live_stream import Capture, FFmpegCapture, LiveFrameSet, LiveStream, TimedPicture, now
+from stseg.io.live.live_stream import Capture, FFmpegCapture, LiveStream, TimedPicture, now
+from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import Recording
 
 _POLL = 0.2
@@ -35,7 +36,7 @@ _REPORT_INTERVAL = 60.0
 _MEBI = 1 << 20
 
 
-class FollowedCameras:
+class FollowedCameras(AbstractContextManager["FollowedCameras"], Iterator[FrameSet]):
     """Frame sets of live cameras.
 
     Parameters
@@ -85,7 +86,7 @@ class FollowedCameras:
         spread = (max(self._offsets) - min(self._offsets)) * self._period
         kept = spread + 2 * self._stale + _SLACK
         self._longest_queue = _queue_length(recording, config)
-        self._queue: deque[LiveFrameSet] = deque()
+        self._queue: deque[FrameSet] = deque()
         self._arrival, self._ready = Condition(), Condition()
         self._reported = -_REPORT_INTERVAL
         self._streams = [
@@ -100,15 +101,10 @@ class FollowedCameras:
             thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *reason: object) -> None:
         self.close()
 
-    def __iter__(self) -> Iterator[LiveFrameSet]:
-        return self
-
-    def __next__(self) -> LiveFrameSet:
+    def __next__(self) -> FrameSet:
         while True:
             for stream in self._streams:
                 if stream.failure is not None:
@@ -149,7 +145,7 @@ class FollowedCameras:
             views = self._views(at)
             if views is None:
                 return
-            self._put(LiveFrameSet(frame, views, max(at)))
+            self._put(FrameSet(frame, views, arrived=max(at)))
 
     def _in_phase(self, least: float) -> float:
         """The first time from `least` on that is in phase with the pictures of the first camera that delivers."""
@@ -195,7 +191,7 @@ class FollowedCameras:
         nearest = min(stream.pictures, key=distance, default=None)
         return None if nearest is None or distance(nearest) > self._stale else nearest.picture
 
-    def _put(self, frame_set: LiveFrameSet) -> None:
+    def _put(self, frame_set: FrameSet) -> None:
         """Queue a frame set; where too many wait, the oldest with observations loses them."""
         with self._ready:
             self._queue.append(frame_set)

@@ -8,24 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from threading import Event
-from types import TracebackType
-from typing import Self
 
 from stseg.arrays import Observation
 from stseg.config import LiveConfig
-from stseg.errors import SourceError
-from stseg.geometry import Camera
 from stseg.io.live.arriving_files import ArrivingFiles, ArrivingVideos, FileNotes
-from stseg.io.live.live_stream import LiveFrameSet
-from stseg.io.recording.recording import CameraSource, Recording
+from stseg.io.recording.aligned_stream import AlignedStream
+from stseg.io.recording.frames import FrameSet
+from stseg.io.recording.recording import Recording
 
 _POLL = 0.2
 """Interval at which a request to stop is noticed while waiting, seconds."""
 
 
-class FollowedFiles:
+class FollowedFiles(AbstractContextManager["FollowedFiles"], Iterator[FrameSet]):
     """Frame sets of a recording whose videos arrive as files, a pattern each (see `stseg.io.live.live_stream.is_live`).
 
     Parameters
@@ -62,38 +59,30 @@ class FollowedFiles:
         self._frame, self._stop, self._config, self._halt, self._report = first, stop, config, halt, report
         self._over = Event()
         """Ends the threads that wait for files."""
-        self._files: list[_AlignedFiles] = []
+        self._videos: list[ArrivingVideos] = []
+        self._streams: list[AlignedStream] = []
         cameras = zip(recording.rig.cameras, recording.sources, recording.factors, strict=True)
         for camera, source, factor in cameras:
             files = ArrivingFiles(source.source.path, config.file_quiet_time, self._over, report)
-            self._files.append(
-                _AlignedFiles(camera, source, ArrivingVideos(source.source, camera, files, notes, factor))
-            )
-            self._files[-1].require_start(first)
+            self._videos.append(ArrivingVideos(source.source, camera, files, notes, factor))
+            self._streams.append(AlignedStream(camera, source, self._videos[-1]))
+            self._streams[-1].require_start(first)
         with ExitStack() as opened:
-            for feed in self._files:
-                opened.callback(feed.close)
-            self._pool = opened.enter_context(ThreadPoolExecutor(len(self._files)))
+            for stream in self._streams:
+                opened.callback(stream.close)
+            self._pool = opened.enter_context(ThreadPoolExecutor(len(self._streams)))
             opened.callback(self._over.set)
             self._opened = opened.pop_all()
         self._ahead = self._read_ahead()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *reason: object) -> None:
         self.close()
 
-    def __iter__(self) -> Iterator[LiveFrameSet]:
-        return self
-
-    def __next__(self) -> LiveFrameSet:
+    def __next__(self) -> FrameSet:
         if self._frame == self._stop or not self._wait_for_frames():
             raise StopIteration
         views = tuple(view.result() for view in self._ahead)
-        frame_set = LiveFrameSet(self._frame, views, max(feed.stream.arrived for feed in self._files))
+        frame_set = FrameSet(self._frame, views, arrived=max(videos.arrived for videos in self._videos))
         self._frame += 1
         self._ahead = self._read_ahead()
         return frame_set
@@ -111,11 +100,8 @@ class FollowedFiles:
                 return True
             waited += _POLL if done else 0.0
             if not reported and waited > self._config.file_quiet_time + self._config.stream_timeout:
-                names = [
-                    camera_files.camera.name
-                    for camera_files, view in zip(self._files, self._ahead, strict=True)
-                    if not view.done()
-                ]
+                pairs = zip(self._streams, self._ahead, strict=True)
+                names = [stream.camera.name for stream, view in pairs if not view.done()]
                 self._report(f"waiting for the next file of {', '.join(names)}, at frame {self._frame}")
                 reported = True
         return False
@@ -123,35 +109,4 @@ class FollowedFiles:
     def _read_ahead(self) -> list[Future[Observation]]:
         if self._frame == self._stop:
             return []
-        return [self._pool.submit(feed.read, self._frame) for feed in self._files]
-
-
-class _AlignedFiles:
-    """One camera's arriving files, read by frames of the recording."""
-
-    def __init__(self, camera: Camera, source: CameraSource, stream: ArrivingVideos) -> None:
-        self.camera, self.source, self.stream = camera, source, stream
-        self._next = 0
-
-    def require_start(self, first: int) -> None:
-        """Raise SourceError where a required camera starts after frame `first` of the recording."""
-        if self.source.on_missing == "error" and first < self.source.offset:
-            raise SourceError(
-                self.source.source.path,
-                f"camera {self.camera.name}, frame {first}",
-                f"a stream that starts at frame {self.source.offset}",
-                'one that shows it, or on_missing = "blind"',
-            )
-
-    def read(self, frame: int) -> Observation:
-        """The observation at a frame, None before the stream begins; frames are read in rising order."""
-        number = frame - self.source.offset
-        if number < 0:
-            return None
-        self._next += self.stream.skip(number - self._next)
-        view = self.stream.read() if self._next == number else None
-        self._next += view is not None
-        return view
-
-    def close(self) -> None:
-        self.stream.close()
+        return [self._pool.submit(stream.read, self._frame) for stream in self._streams]

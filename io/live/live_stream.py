@@ -7,20 +7,19 @@ import re
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from threading import Condition, Event, Thread
 from typing import NamedTuple, Protocol
 
 import cv2
 
 import stseg.io.recording.video.ffmpeg  # noqa: F401  # quietens FFmpeg before its first use
-from stseg.arrays import AnyArray, Observation
+from stseg.arrays import AnyArray
 from stseg.config import LiveConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.recording.image_stream import is_pattern
 from stseg.io.recording.pictures import as_observation, reduced_picture
 from stseg.io.recording.recording import Recording, Source, mask_passwords
+from stseg.io.recording.source_files import is_pattern
 
 _PROTOCOLS = "rtsp,rtsps,rtp,srtp,rtmp,rtmps,rtmpt,srt,udp,tcp,tls,http,https,httpproxy,crypto"
 _OPTIONS = f"rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000|protocol_whitelist;{_PROTOCOLS}"
@@ -197,31 +196,6 @@ class LiveStream(Thread):
 def now() -> float:
     """Seconds since 1970 by a monotonic clock."""
     return _ZERO + time.monotonic()
-
-
-@dataclass(frozen=True, slots=True)
-class LiveFrameSet:
-    """The observations of all cameras at one time.
-
-    Attributes
-    ----------
-    frame
-        The recording's frame.
-    views
-        One observation per camera in the rig's order, None where a camera is blind.
-    arrived
-        When all its observations had arrived, by `now`.
-    dropped
-        Whether its observations were dropped because tracking is slower than the cameras.
-    images
-        Empty: live cameras deliver no detections.
-    """
-
-    frame: int
-    views: tuple[Observation, ...]
-    arrived: float
-    dropped: bool = False
-    images: tuple[Observation, ...] = ()
 
 
 def is_live(recording: Recording) -> bool:

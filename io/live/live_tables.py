@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Self, TextIO
 
 import numpy as np
@@ -18,6 +17,8 @@ from stseg.records.tables import CORRECTION, TRAJECTORY
 
 _COLUMNS = ("frame", "time", "id", "x", "y", "height", "score")
 COLUMNS = CORRECTION.names or ()
+_IDS = 1 << 31
+"""Largest id in a line."""
 
 
 class LiveTable:
@@ -45,12 +46,12 @@ class LiveTable:
 
     def __init__(self, path: Path, frame_rate: float, stop: int) -> None:
         self.path, self._frame_rate = path, frame_rate
-        lines = _lines_before(path, stop)
+        lines = _whole_lines(path, stop, len(_COLUMNS), {0: limits.FRAMES, 2: _IDS})
+        lines = [line for line in lines if parse_numbers(line[3:]) is not None]
         self.rows = np.zeros(len(lines), TRAJECTORY)
         for name in ("frame", "id", "x", "y"):
             self.rows[name] = [parse_number(line[_COLUMNS.index(name)]) for line in lines]
-        with replacing(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([_COLUMNS, *lines])
+        _rewrite(path, _COLUMNS, lines)
         self._file: TextIO | None = None
 
     def __enter__(self) -> Self:
@@ -60,9 +61,7 @@ class LiveTable:
             raise output_error(self.path, error) from error
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *reason: object) -> None:
         if self._file is not None:
             self._file.close()
 
@@ -80,22 +79,6 @@ class LiveTable:
         frame = int(row["frame"])
         numbers = (f"{float(row[name]):.3f}" for name in ("x", "y", "height", "score"))
         return (frame, f"{frame / self._frame_rate:.3f}", int(row["id"]), *numbers)
-
-
-def _lines_before(path: Path, stop: int) -> list[list[str]]:
-    """Lines of frames before `stop`; incomplete lines are dropped."""
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            _, *lines = csv.reader(file)
-    except (OSError, ValueError, csv.Error):
-        return []
-    return [line for line in lines if _is_row(line) and int(line[0]) < stop]
-
-
-def _is_row(line: list[str]) -> bool:
-    if len(line) != len(_COLUMNS) or parse_numbers(line[3:]) is None:
-        return False
-    return all(parse_whole(cell, 0, most) is not None for cell, most in ((line[0], limits.FRAMES), (line[2], 1 << 31)))
 
 
 class CorrectionTable:
@@ -121,11 +104,10 @@ class CorrectionTable:
 
     def __init__(self, path: Path, stop: int) -> None:
         self.path = path
-        lines = [line for line in _lines(path) if line[0] < stop]
-        self.rows = np.array(lines, CORRECTION)
+        lines = _whole_lines(path, stop, len(COLUMNS), dict(enumerate((*(limits.FRAMES,) * 3, _IDS, _IDS))))
+        self.rows = np.array([tuple(map(int, line)) for line in lines], CORRECTION)
         if lines:
-            with replacing(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows([COLUMNS, *lines])
+            _rewrite(path, COLUMNS, lines)
         else:
             path.unlink(missing_ok=True)
 
@@ -139,17 +121,21 @@ class CorrectionTable:
             raise output_error(self.path, error) from error
 
 
-def _lines(path: Path) -> list[tuple[int, ...]]:
-    """The whole lines of a table; none where it cannot be read."""
+def _whole_lines(path: Path, stop: int, columns: int, whole: Mapping[int, int]) -> list[list[str]]:
+    """Lines decided before `stop` with so many cells and, in some columns, whole numbers up to a bound.
+
+    Incomplete lines are dropped; there are none where the file cannot be read.
+    """
     try:
         with path.open(newline="", encoding="utf-8") as file:
             _, *lines = csv.reader(file)
     except (OSError, ValueError, csv.Error):
         return []
-    most = (limits.FRAMES,) * 3 + (1 << 31,) * 2
-    found = [
-        tuple(parse_whole(cell, 0, one) for cell, one in zip(line, most, strict=True))
-        for line in lines
-        if len(line) == len(COLUMNS)
-    ]
-    return [tuple(number for number in line if number is not None) for line in found if None not in line]
+    found = [line for line in lines if len(line) == columns]
+    found = [line for line in found if all(parse_whole(line[k], 0, most) is not None for k, most in whole.items())]
+    return [line for line in found if int(line[0]) < stop]
+
+
+def _rewrite(path: Path, columns: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
+    with replacing(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([columns, *lines])

@@ -14,7 +14,6 @@ from contextlib import suppress
 from http.client import HTTPException
 from queue import Empty, Full, Queue
 from threading import Event, Thread
-from types import TracebackType
 from typing import Any, Protocol, Self
 from urllib.parse import SplitResult, urlsplit
 
@@ -58,9 +57,7 @@ class Publisher:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *reason: object) -> None:
         self._ending.set()
         self._thread.join(_ENDING)
         self._leaving.set()

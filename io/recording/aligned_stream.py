@@ -39,6 +39,16 @@ class AlignedStream:
         """Whether the camera must show every frame."""
         return self.source.on_missing == "error"
 
+    def require_start(self, first: int) -> None:
+        """Raise SourceError where a required camera starts after frame `first` of the recording."""
+        if self.required and first < self.source.offset:
+            raise SourceError(
+                self.source.source.path,
+                f"camera {self.camera.name}, frame {first}",
+                f"a stream that starts at frame {self.source.offset}",
+                'one that shows it, or on_missing = "blind"',
+            )
+
     def read(self, frame: int) -> Observation:
         """The observation at a frame, None where the camera is blind; frames are read in rising order."""
         tick, frame_at_tick = frame - self.source.offset, self.source.frame_at_tick

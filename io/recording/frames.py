@@ -13,14 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import AbstractContextManager, ExitStack, closing
 from dataclasses import dataclass
-from types import TracebackType
 
 from stseg.arrays import Observation
 from stseg.errors import ConfigError, SourceError
 from stseg.io.recording.aligned_stream import (
-    AlignedStream,
     StreamIndex,
     decoder_threads,
     open_aligned_stream,
@@ -45,18 +43,24 @@ class FrameSet:
         One observation per camera in the rig's order, None where a camera is blind.
     images
         Colour frames beside detections, one per camera, None where it has none; empty where none has.
+    arrived
+        Of live cameras: when all observations had arrived, by `stseg.io.live.live_stream.now`.
+    dropped
+        Whether its observations were dropped because tracking is slower than live cameras.
     """
 
     frame: int
     views: tuple[Observation, ...]
     images: tuple[Observation, ...] = ()
+    arrived: float = 0.0
+    dropped: bool = False
 
     def __repr__(self) -> str:
         blind = sum(view is None for view in self.views)
         return f"FrameSet(frame {self.frame}: {len(self.views)} views, {blind} of them blind)"
 
 
-class FrameReader:
+class FrameReader(AbstractContextManager["FrameReader"], Iterator[FrameSet]):
     """Frame sets of a recording in order; made by `open_frames`.
 
     One frame set is decoded ahead, each camera in its own thread, while the caller works on the last one.
@@ -74,21 +78,14 @@ class FrameReader:
         with ExitStack() as opened:
             self._streams = open_aligned_streams(recording, opened, streams.times if streams else ())
             self._images = open_image_streams(recording, opened)
-            _require_start(self._streams, first)
+            for stream in self._streams:
+                stream.require_start(first)
             self._pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))
             self._opened = opened.pop_all()
         self._ahead = self._read_ahead()
 
-    def __enter__(self) -> FrameReader:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *reason: object) -> None:
         self.close()
-
-    def __iter__(self) -> Iterator[FrameSet]:
-        return self
 
     def __next__(self) -> FrameSet:
         if self._frame == self._stop:
@@ -213,14 +210,3 @@ def read_background(recording: Recording, camera_index: int) -> Iterator[Observa
     with closing(open_stream(background, camera, factor=recording.factors[camera_index])) as stream:
         while (view := stream.read()) is not None:
             yield view
-
-
-def _require_start(streams: list[AlignedStream], first: int) -> None:
-    for stream in streams:
-        if stream.required and first < stream.source.offset:
-            raise SourceError(
-                stream.source.source.path,
-                f"camera {stream.camera.name}, frame {first}",
-                f"a stream that starts at frame {stream.source.offset}",
-                'one that shows it, or on_missing = "blind"',
-            )

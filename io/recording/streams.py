@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
 
-from stseg.arrays import Boxes, Floats, Observation
+from stseg.arrays import Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.detections.source_detections import instance_image, read_source
-from stseg.io.recording.image_stream import ImageStream, is_detection_file, is_image_source
+from stseg.io.recording.pictures import read_picture, reduced_view
 from stseg.io.recording.recording import Source, mask_passwords
-from stseg.io.recording.source_files import source_parts
+from stseg.io.recording.source_files import image_paths, is_detection_file, is_image_source, source_parts
 from stseg.io.recording.video.video_stream import VideoStream
 
 
@@ -36,60 +36,68 @@ class Stream(Protocol):
         """Close what is open."""
 
 
-class BoxStream:
-    """Boxes of a file or folder of detections, read whole at once."""
+class CountedStream:
+    """Frames of known number that have no time stamps; nothing is held open.
 
-    def __init__(self, source: Source, camera: Camera) -> None:
-        self._table = read_source(source, camera.size).table
-        self._next = 0
+    Parameters
+    ----------
+    frames
+        Number of frames.
+    read_frame
+        Gives the observation of a frame.
+    """
 
-    def skip(self, count: int) -> int:
-        """Skip up to `count` frames; return how many there were."""
-        skipped = min(count, self._table.frames - self._next)
-        self._next += skipped
-        return skipped
-
-    def read(self) -> Boxes | None:
-        """The next frame's boxes, none where nothing was found; None after the last frame."""
-        if self._next == self._table.frames:
-            return None
-        self._next += 1
-        return self._table.at(self._next - 1)
-
-    def times(self) -> list[Floats]:
-        """Frames of a text file have no time stamps."""
-        return [np.full(self.skip(self._table.frames), np.nan)]
-
-    def close(self) -> None:
-        """Nothing is held open."""
-
-
-class MaskStream:
-    """Instance images drawn from the masks of a file or folder of detections."""
-
-    def __init__(self, source: Source, camera: Camera) -> None:
-        self._found, self._size = read_source(source, camera.size), camera.size
-        self._next = 0
+    def __init__(self, frames: int, read_frame: Callable[[int], Observation]) -> None:
+        self._frames, self._read_frame, self._next = frames, read_frame, 0
 
     def skip(self, count: int) -> int:
         """Skip up to `count` frames; return how many there were."""
-        skipped = min(count, self._found.frames - self._next)
+        skipped = min(count, self._frames - self._next)
         self._next += skipped
         return skipped
 
     def read(self) -> Observation:
-        """The next frame's instance image; None after the last frame."""
-        if not self.skip(1):
-            return None
-        rows = np.flatnonzero(self._found.kept.frame == self._next - 1)
-        return instance_image(self._found.kept, rows.tolist(), self._size)
+        """The next frame; None after the last."""
+        return self._read_frame(self._next - 1) if self.skip(1) else None
 
     def times(self) -> list[Floats]:
-        """Detections have no time stamps."""
-        return [np.full(self.skip(self._found.frames), np.nan)]
+        """Skip the rest: there are no time stamps."""
+        return [np.full(self.skip(self._frames), np.nan)]
 
     def close(self) -> None:
         """Nothing is held open."""
+
+
+def open_boxes(source: Source, camera: Camera) -> CountedStream:
+    """Boxes of a file or folder of detections, read whole at once; raises as `open_stream` does."""
+    table = read_source(source, camera.size).table
+    return CountedStream(table.frames, table.at)
+
+
+def open_masks(source: Source, camera: Camera) -> CountedStream:
+    """Instance images drawn from the masks of a file or folder of detections; raises as `open_stream` does."""
+    found = read_source(source, camera.size)
+
+    def read_frame(number: int) -> Observation:
+        return instance_image(found.kept, np.flatnonzero(found.kept.frame == number).tolist(), camera.size)
+
+    return CountedStream(found.frames, read_frame)
+
+
+def open_images(source: Source, camera: Camera, factor: int) -> CountedStream:
+    """Colour frames, masks or instance images from files (see `stseg.io.recording.pictures.read_picture`).
+
+    SourceError where there is no file, the files do not number their frames without gaps, or, while reading, where one
+    of them is broken or not of the camera's size.
+    """
+    key = f"camera {camera.name}"
+    paths = image_paths(source.path, key)
+
+    def read_frame(number: int) -> Observation:
+        picture = read_picture(paths[number], source.kind, camera.size, f"{key}, frame {number}")
+        return reduced_view(picture, factor)
+
+    return CountedStream(len(paths), read_frame)
 
 
 class JoinedStream:
@@ -181,9 +189,9 @@ def open_stream(
         return JoinedStream(parts, camera, times, factor)
     (source,) = parts
     if source.kind == "boxes":
-        return BoxStream(source, camera)
+        return open_boxes(source, camera)
     if source.kind == "instances" and is_detection_file(source.path):
-        return MaskStream(source, camera)
+        return open_masks(source, camera)
     if source.kind == "video" or (source.kind == "masks" and not is_image_source(source.path)):
         return VideoStream(source, camera, None if times is None else times[0], factor)
-    return ImageStream(source, camera, factor)
+    return open_images(source, camera, factor)

@@ -9,10 +9,10 @@ from stseg.config import Config
 from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.io.config_file import read_config
-from stseg.io.recording.image_stream import is_detection_file, is_image_source
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig, read_recording
+from stseg.io.recording.source_files import is_detection_file, is_image_source
 from stseg.io.runfile.runs import Run, read_run
 
 AnySource = Path | str | Source | CameraSource

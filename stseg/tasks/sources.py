@@ -14,8 +14,8 @@ from stseg.geometry import Camera, Grid
 from stseg.io.detections.source_detections import SourceDetections, read_source
 from stseg.io.outputs.whole_files import make_folder, write_file
 from stseg.io.recording.frames import open_frames
-from stseg.io.recording.image_stream import is_detection_file
 from stseg.io.recording.recording import CameraSource, Recording
+from stseg.io.recording.source_files import is_detection_file
 from stseg.reporting.figures import backdrop
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.canvas import outline

@@ -15,8 +15,8 @@ from stseg.config import LabelConfig
 from stseg.errors import OutputError
 from stseg.geometry import Rig
 from stseg.io.outputs.label_images import LabelImages
-from stseg.io.recording.image_stream import ImageStream
 from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.streams import open_images
 from stseg.io.runfile.runs import RunWriter
 from stseg.records.tables import Tracks
 
@@ -54,10 +54,10 @@ def mask_sources(folder: Path, frame_sets: list[Moment], instances: bool = False
 def read(folder: Path, camera: str) -> list[Bytes]:
     """The images of one camera, by the reader of instance images."""
     (own,) = [camera_ for camera_ in two_cameras().cameras if camera_.name == camera]
-    stream = ImageStream(Source("instances", folder / camera), own)
+    stream = open_images(Source("instances", folder / camera), own, 1)
     images = []
     while (image := stream.read()) is not None:
-        images.append(image)
+        images.append(np.asarray(image))
     return images
 
 

@@ -20,9 +20,9 @@ from stseg.geometry import Rig
 from stseg.io.live.arriving_files import ArrivingFiles, FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
-from stseg.io.live.live_stream import Capture, LiveFrameSet, is_live, now
+from stseg.io.live.live_stream import Capture, is_live, now
 from stseg.io.recording.aligned_stream import count_frames
-from stseg.io.recording.frames import open_frames
+from stseg.io.recording.frames import FrameSet, open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig, read_recording
@@ -203,7 +203,7 @@ def opening(*cameras: StandIn) -> Callable[[str, float], Capture]:
     return open_own
 
 
-def taken(frame_sets: FollowedCameras, count: int) -> list[LiveFrameSet]:
+def taken(frame_sets: FollowedCameras, count: int) -> list[FrameSet]:
     return [next(frame_sets) for _ in range(count)]
 
 

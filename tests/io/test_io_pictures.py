@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from stseg.arrays import Bytes
 from stseg.errors import SourceError
-from stseg.io.recording.image_stream import image_paths
 from stseg.io.recording.pictures import decode_indexed, read_picture, stores_numbers
 from stseg.io.recording.recording import SourceKind
+from stseg.io.recording.source_files import image_paths
 
 GREY, INDEXED = 0, 3
 NONE, SUB, UP, AVERAGE, PAETH = range(5)

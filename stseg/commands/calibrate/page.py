@@ -13,9 +13,9 @@ from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
 from stseg.io.outputs.whole_files import require_new, write_page
-from stseg.io.recording.image_stream import is_image_source
 from stseg.io.recording.pictures import read_colour
 from stseg.io.recording.recording import Source
+from stseg.io.recording.source_files import is_image_source
 from stseg.io.recording.streams import open_stream
 from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.reporting.page.calibration_page import FloorPlan, calibration_page

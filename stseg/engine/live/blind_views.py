@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io.live.live_stream import LiveFrameSet
+from stseg.io.recording.frames import FrameSet
 from stseg.records.tables import EVENT
 
 
@@ -25,7 +25,7 @@ class BlindViews:
         self._dropped: set[int] = set()
         self._missing: dict[int, list[int]] = {}
 
-    def note(self, frame_set: LiveFrameSet) -> None:
+    def note(self, frame_set: FrameSet) -> None:
         """Record the missing views of a frame set."""
         missing = [k for k, view in enumerate(frame_set.views) if view is None]
         if frame_set.dropped:

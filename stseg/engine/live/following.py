@@ -27,11 +27,12 @@ from stseg.io.config_file import format_config
 from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
-from stseg.io.live.live_stream import LiveFrameSet, is_live
+from stseg.io.live.live_stream import is_live
 from stseg.io.live.live_tables import CorrectionTable, LiveTable
 from stseg.io.live.publishing import Publisher, Receiver
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.aligned_stream import StreamIndex
+from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
@@ -47,7 +48,7 @@ ENDLESS = 1 << 62
 class _Coming:
     """Future frame sets, the segments of their frames, and the first frame of the first background period."""
 
-    frame_sets: Iterable[LiveFrameSet]
+    frame_sets: Iterable[FrameSet]
     plan: Iterator[Segment]
     since: int
 
@@ -253,9 +254,7 @@ def _cameras(
             reporter.note(f"{frame_sets.dropped} frame sets were dropped in all: see /events")
 
 
-def _learn(
-    foregrounds: LiveForegrounds, frame_sets: Iterable[LiveFrameSet], seconds: float, reporter: Reporter
-) -> bool:
+def _learn(foregrounds: LiveForegrounds, frame_sets: Iterable[FrameSet], seconds: float, reporter: Reporter) -> bool:
     """Teach the cameras that have no empty scene; False where the run is stopped before anything came."""
     reporter.note(
         f"no empty scene of {', '.join(foregrounds.untrained)}: learning from {seconds:g} s before the run begins"

@@ -17,7 +17,7 @@ from stseg.engine.offline.backgrounds import BackgroundLearner, empty_background
 from stseg.foreground.background.model import Background
 from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.io.live.live_stream import LiveFrameSet
+from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import Recording
 
 
@@ -51,7 +51,7 @@ class LiveForegrounds:
         """Names of the cameras whose background is not trained yet."""
         return [self._recording.rig.cameras[k].name for k in sorted(self._untrained)]
 
-    def learn(self, frame_sets: Iterable[LiveFrameSet]) -> int:
+    def learn(self, frame_sets: Iterable[FrameSet]) -> int:
         """Train the backgrounds of the cameras without an empty scene.
 
         Parameters
@@ -80,7 +80,7 @@ class LiveForegrounds:
                 self._untrained.discard(k)
         return count
 
-    def update(self, frame_set: LiveFrameSet, since: int) -> None:
+    def update(self, frame_set: FrameSet, since: int) -> None:
         """Update the backgrounds by the next frame set, where it is one of the training frames.
 
         Parameters

@@ -21,9 +21,10 @@ from stseg.engine.live.open_segment import OpenSegment
 from stseg.engine.offline.assembly import FinishedSegment
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
-from stseg.io.live.live_stream import LiveFrameSet, now
+from stseg.io.live.live_stream import now
 from stseg.io.live.live_tables import CorrectionTable, LiveTable
 from stseg.io.live.publishing import Publisher
+from stseg.io.recording.frames import FrameSet
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.records.border import Border
 from stseg.records.tables import TRAJECTORY
@@ -113,7 +114,7 @@ class LiveRun:
         self._plan, self._coming, self._since = plan, next(plan), since
         self._published = self._coming.first
 
-    def add(self, frame_set: LiveFrameSet) -> None:
+    def add(self, frame_set: FrameSet) -> None:
         """Process the next frame set."""
         self.foregrounds.update(frame_set, self._since)
         self._blind_views.note(frame_set)

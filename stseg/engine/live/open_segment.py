@@ -14,7 +14,7 @@ from stseg.engine.offline.segments import Segment
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import Session
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.io.live.live_stream import LiveFrameSet
+from stseg.io.recording.frames import FrameSet
 from stseg.trajectories.live_ids import Names
 
 
@@ -61,7 +61,7 @@ class OpenSegment:
         """Close the writer; a file that was not kept is discarded."""
         self._writer.__exit__(None, None, None)
 
-    def add(self, frame_set: LiveFrameSet) -> list[CommittedFrames]:
+    def add(self, frame_set: FrameSet) -> list[CommittedFrames]:
         """Process the next frame set; the frames that it commits."""
         self._shifts.measure(frame_set)
         return self._session.add(frame_set)
