@@ -9,7 +9,7 @@ from typing import Literal
 
 from stseg.arrays import Ints
 from stseg.geometry import Camera, Rig
-from stseg.geometry.reduction import greatest_reduction
+from stseg.geometry.rig import greatest_reduction
 
 SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
 ClockSource = Literal["auto", "stamps", "count"]

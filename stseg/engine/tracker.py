@@ -16,7 +16,7 @@ from stseg.errors import SourceError
 from stseg.foreground import IlluminationMonitor, make_background
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
-from stseg.geometry.reduction import greatest_reduction
+from stseg.geometry.rig import greatest_reduction
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.pictures import reduced_view
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks

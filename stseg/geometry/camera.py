@@ -1,4 +1,9 @@
-"""Camera model: a ground homography, a scaled vertical vanishing point, and an optional lens."""
+"""Camera model: a ground homography, a scaled vertical vanishing point, and an optional lens.
+
+The homography `H` maps ground metres to pixels; the vertical `a v` is what one metre of height adds to its third column
+(Khan and Shah 2009, eq. 8; docs/how-it-works.md, Geometry). With a projection matrix `[p1 p2 p3 p4]` they are
+`[p1 p2 p4]` and `p3`.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +14,10 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats
 from stseg.errors import CalibrationError
-from stseg.geometry.lens import Lens
-from stseg.geometry.planes import plane_homography, reduction
+from stseg.geometry.lens import Lens, reduction
 
 _SINGULAR = 1e12
+_E3 = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -92,8 +97,8 @@ class Camera:
         return Camera(self.name, size, smaller @ self.ground, smaller @ self.vertical, lens)
 
     def plane(self, height: float) -> Floats:
-        """Homography of the plane at `height` metres, float64 (3, 3)."""
-        return plane_homography(self.ground, self.vertical, height)
+        """Homography of the parallel plane at `height` metres, H(Z) = H + Z a v e3^T, float64 (3, 3)."""
+        return np.asarray(self.ground + height * np.outer(self.vertical, _E3))
 
     def project(self, ground: Floats, height: Floats | float) -> tuple[Floats, Flags]:
         """Pixels of points in space.

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from stseg.arrays import Flags, Floats
-from stseg.geometry.planes import reduction
 
 _UNDISTORT_ROUNDS = 50
 
@@ -127,6 +126,12 @@ class Lens:
             ],
             -2,
         )
+
+
+def reduction(factor: int) -> Floats:
+    """From pixels to those of an image reduced by a whole factor, each the mean of a square; float64 (3, 3)."""
+    corner = (1 / factor - 1) / 2
+    return np.array([[1 / factor, 0.0, corner], [0.0, 1 / factor, corner], [0.0, 0.0, 1.0]])
 
 
 def _solve(slope: Floats, miss: Floats) -> Floats:

@@ -1,7 +1,8 @@
-"""A rig: the cameras of one recording and the ground that they watch."""
+"""A rig: the cameras of one recording and the ground that they watch; what a camera shows of that ground."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError
 from stseg.geometry.camera import Camera
+from stseg.geometry.fits import homogeneous
 from stseg.geometry.grid import Grid
 
 
@@ -132,3 +134,54 @@ class Rig:
 def _sees(camera: Camera, ground: Floats, height: float) -> Floats:
     pixel, ahead = camera.project(ground, height)
     return np.asarray(ahead & camera.inside(pixel))
+
+
+def is_mirrored(camera: Camera, grid: Grid) -> bool:
+    """Whether the camera's image would show the area, below its horizon, were it not behind the camera.
+
+    A camera's matrix is signed for a right-handed world. In a mirrored one the same matrix has the other sign, and all
+    that it shows lies behind it. (Above its horizon a camera sees nothing of the ground in any case.)
+    """
+    ground = grid.ground[grid.inside()]
+    for height in grid.heights:
+        plane = camera.plane(float(height))
+        image = homogeneous(ground) @ plane.T
+        finite = np.abs(image[:, 2]) > 1e-12
+        pixel = image[finite, :2] / image[finite, 2:]
+        inside = camera.inside(pixel)
+        a, b, c = np.linalg.inv(plane)[2]  # the vanishing line e3^T H^-1
+        below = pixel[:, 1] > -(a * pixel[:, 0] + c) / b if b else np.ones(len(pixel), bool)
+        if (inside & (image[finite, 2] > 0)).any():
+            return False
+        if (inside & below).any():
+            return True
+    return False
+
+
+BODY_HEIGHT = 1.7
+"""Height of a standing person, metres."""
+
+
+def greatest_reduction(camera: Camera, grid: Grid, rows: float) -> int:
+    """The greatest whole factor by which a view's images can be reduced.
+
+    Parameters
+    ----------
+    camera, grid
+        The view and its ground.
+    rows
+        Pixels that a standing person spans at least afterwards, in the median over the cells where they are seen whole.
+
+    Returns
+    -------
+    int
+        1 or more.
+    """
+    ground = grid.ground[grid.inside()]
+    feet, before_feet = camera.project(ground, 0.0)
+    head, before_head = camera.project(ground, BODY_HEIGHT)
+    whole = before_feet & before_head & camera.inside(feet) & camera.inside(head)
+    if not whole.any():
+        return 1
+    spanned = float(np.median(np.hypot(*(feet - head)[whole].T)))
+    return max(1, math.floor(spanned / rows))

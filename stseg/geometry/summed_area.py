@@ -6,6 +6,8 @@ over a footprint comes from four entries by differences, and is itself below 2^3
 
 from __future__ import annotations
 
+from typing import NamedTuple, Self
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,26 @@ UNSEEN = -1
 Sums = NDArray[np.uint32]
 Levels = NDArray[np.int16]
 """int16 (plane, y, x): mean likelihood of each cell's footprint in units of 1 / TOP, or UNSEEN."""
+
+
+class SumTable(NamedTuple):
+    """Sums over a part of a view, the column and row where that part begins, and the lowest level there."""
+
+    sums: Sums
+    left: int
+    top: int
+    lowest: int
+
+    @classmethod
+    def over(cls, region: tuple[slice, slice]) -> Self:
+        """A table for rows and columns of a view, not filled yet."""
+        rows, columns = region
+        sums = np.empty((rows.stop - rows.start + 1, columns.stop - columns.start + 1), np.uint32)
+        return cls(sums, columns.start, rows.start, TOP_LEVEL)
+
+    def filled(self, likelihood: Singles) -> Self:
+        """The table of a view's map (v, u); the array of sums is used anew."""
+        return self._replace(lowest=fill_sums(likelihood, self.left, self.top, self.sums))
 
 
 @kernel
@@ -76,36 +98,3 @@ def sum_of(sums: Sums, left: int, top: int, right: int, bottom: int) -> np.uint3
     # Unsigned places: none is negative, which is not asked here.
     u, v, stop, end = np.uint64(left), np.uint64(top), np.uint64(right), np.uint64(bottom)
     return np.uint32((sums[end, stop] - sums[end, u]) - (sums[v, stop] - sums[v, u]))
-
-
-@kernel
-def fill_means(sums: Sums, footprint: NDArray[np.int16], left: int, top: int, levels: Levels) -> None:
-    """Fill levels (plane, y, x) with means over footprints.
-
-    Parameters
-    ----------
-    sums : uint32 (v + 1, u + 1)
-        Of the part of the view that begins at column `left` and row `top`.
-    footprint : int16 (plane, y, x, 4)
-        See `stseg.geometry.sampling`.
-    """
-    boxes, flat = footprint.reshape(-1, 4), levels.reshape(-1)
-    for c in range(len(boxes)):
-        width, height = np.int32(boxes[c, 2]), np.int32(boxes[c, 3])
-        if width == 0:
-            flat[c] = UNSEEN
-            continue
-        u, v = boxes[c, 0] - left, boxes[c, 1] - top
-        total = np.float32(sum_of(sums, u, v, u + width, v + height))
-        flat[c] = np.int32(total / np.float32(width * height) + np.float32(0.5))
-
-
-@kernel
-def fill_points(likelihood: Singles, footprint: NDArray[np.int16], levels: Levels) -> None:
-    """The same where every footprint is one pixel: of the whole view, without its sums."""
-    boxes, flat = footprint.reshape(-1, 4), levels.reshape(-1)
-    for c in range(len(boxes)):
-        if boxes[c, 2] == 0:
-            flat[c] = UNSEEN
-            continue
-        flat[c] = level_of(likelihood[boxes[c, 1], boxes[c, 0]])

@@ -130,12 +130,6 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
     return np.log(body / empty).astype(np.float32)
 
 
-def synergy_terms(floor: float) -> Singles:
-    """log max(L, floor) of each level, nats, float32 (2, TOP_LEVEL + 1): the same near people."""
-    likelihood = np.arange(TOP_LEVEL + 1) / TOP_LEVEL
-    return np.tile(np.log(np.maximum(likelihood, floor)).astype(np.float32), (2, 1))
-
-
 @kernel
 def fill_sums(views: FrameTerms, sums: Sums) -> None:
     """Add what all views see to sums, 0 before."""

@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Bytes, Flags, Floats, Ints, Labels
-from stseg.geometry.cell_means import SumTable
 from stseg.geometry.sampling import Footprints
-from stseg.geometry.summed_area import UNSEEN, Levels, sum_of
+from stseg.geometry.summed_area import UNSEEN, Levels, SumTable, sum_of
 from stseg.kernels.accelerate import kernel
 
 SIDE = 4

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
-from stseg.geometry.cell_means import SumTable
 from stseg.geometry.sampling import Footprints
-from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels, sum_of
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels, SumTable, sum_of
 from stseg.kernels.accelerate import kernel, part
 from stseg.occupancy.shown_cells import Reach, ShownCells
 

@@ -16,10 +16,9 @@ from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Rig
-from stseg.geometry.cell_means import CellMeans, SumTable
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
-from stseg.geometry.summed_area import UNSEEN, Levels
+from stseg.geometry.summed_area import UNSEEN, Levels, SumTable
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match, mark_fit
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
@@ -71,7 +70,7 @@ class Occupancy:
         self.heights = np.asarray(body.heights)
         self.height_mean, self.height_spread = body.height_mean, body.height_spread
         self.prior = prior_log_odds(config)
-        self._means = CellMeans(self.sampling)
+        self._sums = [SumTable.over(region) for region in self.sampling.regions()]
         self._tables = CellTables(self.sampling.footprint)
         self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]
         self._first_rates = [_first_rates(kind, detection) for kind in kinds]
@@ -144,7 +143,7 @@ class Occupancy:
         mark_people(self._tables.reach[i], assignment, people)
         if isinstance(view, Boxes):
             return _PreparedView(assignment, people, None, self._fit(i, view, explanation, near_person, noise))
-        return _PreparedView(assignment, people, self._means.sum_table(i, view), None)
+        return _PreparedView(assignment, people, self._sums[i].filled(view), None)
 
     def _marked(self, i: int, view: _PreparedView | None) -> Flags:
         """The blocks at which a view shows a person or foreground."""

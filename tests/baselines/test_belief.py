@@ -11,7 +11,7 @@ import pytest
 import reference_belief as plain
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import CONFIG, FRAME_RATE, SIZE, corner_cameras, found, mask, people, room
+from scenes import CONFIG, FRAME_RATE, SIZE, found, mask, people, room
 from strategies import cameras
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows
@@ -25,9 +25,8 @@ from stseg.baselines.du_piater_2006.target_likelihood import TargetLikelihood, s
 from stseg.baselines.du_piater_2006.tracker import BeliefTracker
 from stseg.baselines.du_piater_2006.view import StarView
 from stseg.config import BeliefConfig, Config
-from stseg.errors import CalibrationError, ConfigError, SourceError
+from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
-from stseg.geometry.square_pixels import vertical_of_square_pixels
 from stseg.kernels.accelerate import python_form
 from stseg.records.sparse_volume import SparseVolume
 from stseg.trackers import Commit, FrameObservations, FusedFrame, find_tracker
@@ -158,17 +157,6 @@ def test_above_the_horizon_there_is_no_ground() -> None:
 def test_a_view_shows_those_in_its_image() -> None:
     assert VIEWS[0].shows(np.zeros(2), 1.7, 0.5)
     assert not VIEWS[0].shows(np.array([-3.4, -3.3]), 1.7, 0.5)
-
-
-@pytest.mark.parametrize("k", range(4))
-def test_the_vertical_follows_from_the_ground_homography_alone(k: int) -> None:
-    camera = corner_cameras()[k]
-    np.testing.assert_allclose(vertical_of_square_pixels(camera.ground, camera.size), camera.vertical, rtol=1e-6)
-
-
-def test_no_vertical_for_a_homography_that_no_camera_has() -> None:
-    with pytest.raises(CalibrationError, match="square pixels"):
-        vertical_of_square_pixels(np.array([[100.0, 0, 64], [0, 300.0, 48], [0, 0, 1]]), SIZE)
 
 
 # Colours

@@ -19,7 +19,6 @@ from stseg.baselines.huang_wang_2012.pillar_strips import Pillars
 from stseg.config import BodyConfig, ProposalConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.geometry.planes import plane_homography
 from stseg.geometry.summed_area import TOP_LEVEL, fill_sums
 
 FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
@@ -130,7 +129,7 @@ def test_a_pillar_stands_where_the_homographies_say(camera: Camera) -> None:
     if np.isnan(pillars.edge[0, 0]):
         return
     for k, height in ((0, 0.0), (-3, HEIGHTS[0]), (-1, HEIGHTS[2])):
-        column = plane_homography(camera.ground, camera.vertical, float(height)) @ [0.0, 0.0, 1.0]
+        column = camera.plane(float(height)) @ [0.0, 0.0, 1.0]
         axis = column[:2] / column[2]
         along = 1 if pillars.upright[0] else 0
         assert pillars.edge[0, k] == pytest.approx(axis[along] + 0.5, abs=1e-2 + 1e-5 * abs(axis[along]))

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, found, likelihoods, looking, people, rig_of
 
 from stseg.arrays import Floats, Singles
-from stseg.baselines.khan_shah_2009.synergy_map import Localiser
+from stseg.baselines.khan_shah_2009.synergy_map import Localiser, fill_means, synergy_terms
 from stseg.config import OccupancyConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
-from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, fill_means, fill_points, fill_sums, sum_of
-from stseg.occupancy.fusion import ErrorRates, log_odds_terms, synergy_terms
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, fill_sums, sum_of
+from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 from stseg.occupancy.volume import Occupancy
 from stseg.records.people import Explanation
 
@@ -61,11 +61,6 @@ def test_means_over_footprints_by_definition(width: int, height: int, seed: int)
     for box, level in zip(boxes, levels[0, 0], strict=False):
         mean = np.mean([likelihood[v, u] for v, u in reference.pixels_of(box)])
         assert level / TOP_LEVEL == pytest.approx(mean, abs=1.01 / TOP_LEVEL)
-    footprint[..., 2:].clip(0, 1, out=footprint[..., 2:])
-    fill_points(likelihood, footprint, levels)
-    assert levels[0, 0, -1] == UNSEEN
-    for (left, top, _, _), level in zip(boxes, levels[0, 0], strict=False):
-        assert level / TOP_LEVEL == pytest.approx(likelihood[top, left], abs=0.51 / TOP_LEVEL)
 
 
 def test_sums_may_pass_the_end_of_their_numbers() -> None:

@@ -12,7 +12,6 @@ from stseg.arrays import Floats
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.grid import inside_polygon
-from stseg.geometry.planes import plane_homography, vanishing_line
 from stseg.geometry.projection import LensTerms, pixel_of
 
 MATRIX = np.array([[492.3, 0.0, 341.1], [0.0, 494.7, 225.1], [0.0, 0.0, 1.0]])
@@ -75,8 +74,8 @@ class TestPlanes:
     @given(cameras(lenses=False), HEIGHTS)
     def test_the_third_column_and_the_homology_of_the_image_are_one(self, camera: Camera, height: float) -> None:
         """Khan and Shah 2009, eq. 8: H(Z) = (I + Z a v l^T) H with the vanishing line l of the ground."""
-        lift = np.eye(3) + height * np.outer(camera.vertical, vanishing_line(camera.ground))
-        plane = plane_homography(camera.ground, camera.vertical, height)
+        lift = np.eye(3) + height * np.outer(camera.vertical, np.linalg.inv(camera.ground)[2])
+        plane = camera.plane(height)
         np.testing.assert_allclose(lift @ camera.ground, plane, rtol=0, atol=1e-9 * np.abs(plane).max())
 
 

@@ -15,7 +15,7 @@ from strategies import BARREL, numbers
 from stseg.commands.main import main
 from stseg.detection.score.scoring import set_score
 from stseg.geometry import Grid, Rig
-from stseg.geometry.reduction import greatest_reduction
+from stseg.geometry.rig import greatest_reduction
 from stseg.io.recording.frames import open_frames, read_background
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import read_recording

@@ -13,10 +13,12 @@ import numpy as np
 from stseg.arrays import Bytes, Floats, Singles
 from stseg.errors import SourceError
 from stseg.geometry import Rig
-from stseg.geometry.cell_means import CellMeans
-from stseg.geometry.sampling import Sampling, SamplingKind
+from stseg.geometry.sampling import Footprints, Sampling, SamplingKind
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels, SumTable, sum_of
+from stseg.geometry.summed_area import Sums as AreaSums
+from stseg.kernels.accelerate import kernel
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms, synergy_terms
+from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 
 Maps = Sequence[Singles | None]
 """The likelihood map float32 (v, u) of each view, 0..1, or None where it is blind."""
@@ -37,7 +39,7 @@ class Localiser:
 
     def __init__(self, rig: Rig, sampling: SamplingKind = "footprint") -> None:
         self.rig, self.sampling = rig, Sampling.of(rig, sampling)
-        self._means = CellMeans(self.sampling)
+        self._tables = [SumTable.over(region) for region in self.sampling.regions()]
         self._views = self.sampling.views()
         self._no_person = np.full(self._views.size, -1, np.int32)
 
@@ -103,7 +105,7 @@ class Localiser:
 
     def _fuse(self, maps: Maps, weights: Floats, terms: Singles, prior: float) -> Singles:
         self._require(maps)
-        levels = [self._means.levels(i, view).reshape(-1) for i, view in enumerate(maps) if view is not None]
+        levels = [self._levels(i, view).reshape(-1) for i, view in enumerate(maps) if view is not None]
         sighted = [i for i, view in enumerate(maps) if view is not None]
         levels_of_views = np.array(levels, np.int16).reshape(len(sighted), -1)
         share, no_people = np.ones(levels_of_views.shape, np.float32), np.ones((len(sighted), 0), np.float32)
@@ -113,6 +115,12 @@ class Localiser:
         total[self._views.reshape(-1) == 0] = np.nan
         return total.reshape(self._views.shape)
 
+    def _levels(self, i: int, view: Singles) -> Levels:
+        """Mean level of each cell in a view's map (v, u)."""
+        table, levels = self._tables[i].filled(view), np.empty(self._views.shape, np.int16)
+        fill_means(table.sums, self.sampling.footprint[i], table.left, table.top, levels)
+        return levels
+
     def _require(self, maps: Maps) -> None:
         cameras = self.rig.cameras
         if len(maps) != len(cameras):
@@ -120,3 +128,23 @@ class Localiser:
         for camera, view in zip(cameras, maps, strict=True):
             if view is not None and view.shape != camera.size[::-1]:
                 raise SourceError(f"camera {camera.name}", "shape of the map", view.shape, f"{camera.size[::-1]}")
+
+
+def synergy_terms(floor: float) -> Singles:
+    """log max(L, floor) of each level, nats, float32 (2, TOP_LEVEL + 1): the same near people."""
+    likelihood = np.arange(TOP_LEVEL + 1) / TOP_LEVEL
+    return np.tile(np.log(np.maximum(likelihood, floor)).astype(np.float32), (2, 1))
+
+
+@kernel
+def fill_means(sums: AreaSums, footprint: Footprints, left: int, top: int, levels: Levels) -> None:
+    """Fill levels (plane, y, x) with means over footprints (plane, y, x, 4), by sums from a column and row on."""
+    boxes, flat = footprint.reshape(-1, 4), levels.reshape(-1)
+    for c in range(len(boxes)):
+        width, height = np.int32(boxes[c, 2]), np.int32(boxes[c, 3])
+        if width == 0:
+            flat[c] = UNSEEN
+            continue
+        u, v = boxes[c, 0] - left, boxes[c, 1] - top
+        total = np.float32(sum_of(sums, u, v, u + width, v + height))
+        flat[c] = np.int32(total / np.float32(width * height) + np.float32(0.5))

@@ -16,7 +16,7 @@ from scipy import ndimage
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.bodies.pillars import BodyTable
 from stseg.geometry import Camera, Grid, Rig
-from stseg.geometry.reduction import BODY_HEIGHT
+from stseg.geometry.rig import BODY_HEIGHT
 
 _MIN_HEIGHT, _MAX_HEIGHT = 1.35, 2.10
 GATE = 0.35

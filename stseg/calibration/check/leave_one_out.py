@@ -15,7 +15,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.box_correspondence import BoxCorrespondences
-from stseg.geometry.reduction import BODY_HEIGHT
+from stseg.geometry.rig import BODY_HEIGHT
 
 _EDGE_SPREAD, _PIXEL_SPREAD = (0.06, 0.045, 0.06), 2.0
 """Standard deviations of a box's middle, upper and lower edge as shares of the body's height, and pixels added to each

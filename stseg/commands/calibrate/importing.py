@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from stseg.commands.calibrate.scene import SceneOptions, StreamOptions, size_of, words
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera, Rig
-from stseg.geometry.handedness import is_mirrored
+from stseg.geometry.rig import is_mirrored
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.formats import FORMATS, ImportOptions, help_text, read_cameras
 from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_height

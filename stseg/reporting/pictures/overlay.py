@@ -12,7 +12,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.bodies.pillars import PROFILE
 from stseg.geometry import Camera, Grid
-from stseg.geometry.reduction import BODY_HEIGHT
+from stseg.geometry.rig import BODY_HEIGHT
 from stseg.reporting.pictures.canvas import (
     blank,
     chip,

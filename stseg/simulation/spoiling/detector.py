@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Floats, Ints
 from stseg.geometry import Camera
-from stseg.geometry.reduction import BODY_HEIGHT
+from stseg.geometry.rig import BODY_HEIGHT
 from stseg.kernels.accelerate import kernel
 
 _MIN_AREA = 0.0015  # least visible area of a detection, share of the image

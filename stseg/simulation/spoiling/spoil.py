@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Bytes, Floats, Rows
 from stseg.errors import ConfigError
 from stseg.geometry import Camera, Rig
-from stseg.geometry.reduction import BODY_HEIGHT
+from stseg.geometry.rig import BODY_HEIGHT
 from stseg.simulation.film import SceneFilm
 from stseg.simulation.scene import Kind
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
