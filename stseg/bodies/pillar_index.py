@@ -114,7 +114,7 @@ def fill_fits(
     bodies : float (pillar, 4), box : float64 (4,)
         left, top, right, bottom, pixels.
     tolerance : float64 (5,), belief
-        See `stseg.bodies.box_noise`.
+        See `stseg.bodies.box_fit`.
 
     Returns
     -------

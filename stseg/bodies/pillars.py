@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Floats, Singles
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.geometry.camera import Camera
 from stseg.geometry.grid import Grid
 from stseg.kernels.accelerate import kernel
@@ -146,3 +146,22 @@ def _fill_boxes(
             top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
         if visible:
             filled[i, 0], filled[i, 1], filled[i, 2], filled[i, 3] = left, top, right, bottom
+
+
+def inside_bodies(grid: Grid, near_person: Ints, ground: Floats, height: Floats) -> Flags:
+    """Cells that the pillar of the person near them fills, bool (plane, y, x).
+
+    Parameters
+    ----------
+    near : int64 (y, x)
+        The person near each cell, -1 for none.
+    ground, height : float64 (person, 2), (person,)
+        Metres.
+    """
+    inside = np.zeros(grid.shape, bool)
+    within_reach = near_person >= 0
+    person = near_person[within_reach]
+    distance = np.hypot(*(grid.ground[within_reach] - ground[person]).T)
+    for plane, above in zip(inside, grid.heights, strict=True):
+        plane[within_reach] = distance <= np.interp(above / height[person], PROFILE[:, 0], PROFILE[:, 1], right=-1.0)
+    return inside

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Shorts, Singles
-from stseg.bodies.box_fit import fill_inside
-from stseg.bodies.box_noise import PRIOR_NOISE, BoxNoise
+from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, fill_inside
 from stseg.bodies.outlines import Spans, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import WIDTH, BodyTable
@@ -37,7 +36,7 @@ class ViewObservation:
     score : float64 (box,)
         0..1.
     tolerance : float64 (box, 5), belief : float64 (box,)
-        See `stseg.bodies.box_noise`.
+        See `stseg.bodies.box_fit`.
     raster : float32 (v, u)
         Log-odds of foreground, nats.
     """

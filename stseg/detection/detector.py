@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.arrays import Flags, ViewEvidence
-from stseg.bodies.box_noise import BoxNoise
+from stseg.bodies.box_fit import BoxNoise
 from stseg.bodies.views import BoxView, PixelView, ViewObservation
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.evidence.birth_lattice import lattice

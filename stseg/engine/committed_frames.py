@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from threading import Lock
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
-from stseg.engine.stopwatch import Stopwatch
+from stseg.geometry import Rig
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate
 from stseg.records.people import Explanation, People
 from stseg.records.sparse_volume import SparseVolume
-from stseg.records.tables import CANDIDATE, RATES
+from stseg.records.tables import CANDIDATE, RATES, TIMING
 from stseg.trackers import Commit
 
 
@@ -32,6 +36,8 @@ class CommittedFrames:
     timings : TIMING (k,)
     appearance : APPEARANCE (l,)
         What detections look like.
+    shifts : SHIFT (j,)
+        Shifts of images from their backgrounds, where they are measured.
     """
 
     commit: Commit
@@ -40,6 +46,7 @@ class CommittedFrames:
     rates: Rows
     timings: Rows
     appearance: Rows
+    shifts: Rows
 
     def __repr__(self) -> str:
         frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"
@@ -94,6 +101,7 @@ class CommittedFrames:
             self.rates[_inside(self.rates["frame"], first, stop)],
             self.timings,
             self.appearance[_inside(self.appearance["frame"], first, stop)],
+            self.shifts[_inside(self.shifts["frame"], first, stop)],
         )
 
 
@@ -105,21 +113,23 @@ class FusedEvidence(NamedTuple):
 
 
 class FrameRecord(NamedTuple):
-    """A frame's explanation, fusion (which may still be at work), APPEARANCE and EVENT of views, until its commit."""
+    """A frame's explanation, fusion (which may be at work), APPEARANCE, EVENT and SHIFT of views, until its commit."""
 
     explanation: Explanation
     fusion: Future[FusedEvidence]
     appearance: Rows
     events: Rows
+    shifts: Rows
 
 
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
-    rows, parts, residuals, appearance, events = [], [], [], [], [commit.events]
+    rows, parts, residuals, appearance, shifts, events = [], [], [], [], [], [commit.events]
     for fused in commit.frames:
-        explanation, fusion, rows_of_frame, of_views = records.pop(fused.frame)
+        explanation, fusion, rows_of_frame, of_views, measured = records.pop(fused.frame)
         rates = fusion.result().rates
         appearance.append(rows_of_frame)
+        shifts.append(measured)
         events.append(of_views)
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
@@ -130,7 +140,7 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
     commit = replace(commit, events=np.concatenate(events))
     return CommittedFrames(
         commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window),
-        np.concatenate(appearance),
+        np.concatenate(appearance), np.concatenate(shifts),
     )  # fmt: skip
 
 
@@ -163,3 +173,39 @@ def _candidate_rows(frame: int, status: int, people: People) -> Rows:
         people.covariance[:, 1, 1],
     )
     return rows
+
+
+def within_area(commit: Commit, rig: Rig) -> Commit:
+    """A commit without the rows, and labels, of people outside the area; in closed rooms nobody is outside."""
+    rows = commit.trajectory
+    inside = rig.grid.contains(np.stack([rows["x"], rows["y"]], -1))
+    if rig.closed or inside.all():
+        return commit
+    label, outside = commit.label.copy(), rows[~inside]
+    for fused, cells in zip(commit.frames, label, strict=True):
+        cells[np.isin(cells, outside["id"][outside["frame"] == fused.frame])] = 0
+    return replace(commit, label=label, trajectory=rows[inside])
+
+
+@dataclass
+class Stopwatch:
+    """Seconds of each stage since the last call of `take`; stages may run in threads of their own."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    @contextmanager
+    def time(self, stage: str) -> Iterator[None]:
+        """Add the duration of the body to a stage."""
+        start = perf_counter()
+        try:
+            yield
+        finally:
+            with self._lock:
+                self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - start
+
+    def take(self, window: int) -> Rows:
+        """TIMING rows of all stages under the number of a window; the sums start anew."""
+        with self._lock:
+            seconds, self.seconds = self.seconds, {}
+        return np.array([(stage.encode(), window, s) for stage, s in seconds.items()], TIMING)

@@ -17,17 +17,26 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from typing import NamedTuple, Protocol
 
-from stseg.arrays import Observation, Singles, ViewEvidence
-from stseg.bodies.box_noise import BoxNoise
-from stseg.engine.area import within_area
-from stseg.engine.committed_frames import CommittedFrames, FrameRecord, FusedEvidence, committed_frames, rate_rows
+import numpy as np
+
+from stseg.arrays import Observation, Rows, Singles, ViewEvidence
+from stseg.bodies.box_fit import BoxNoise
+from stseg.engine.committed_frames import (
+    CommittedFrames,
+    FrameRecord,
+    FusedEvidence,
+    Stopwatch,
+    committed_frames,
+    rate_rows,
+    within_area,
+)
 from stseg.engine.pipeline import Pipeline
-from stseg.engine.stopwatch import Stopwatch
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.records.people import Explanation
+from stseg.records.tables import SHIFT
 from stseg.trackers import Commit, FrameObservations, FusedFrame
-from stseg.view_health.excluded_views import ExcludedViews
-from stseg.view_health.frozen_views import FrozenViews
+from stseg.view_health.blind_views import ExcludedViews, FrozenViews
+from stseg.view_health.image_shifts import image_shifts, shift_is_due
 
 _AHEAD = 2
 """Frames whose foreground is made before their detection."""
@@ -57,6 +66,8 @@ class Session:
         Foreground model of each camera, in the rig's order; they learn from the frames.
     first
         Number of the first frame.
+    factors
+        Reduction factor of each camera's images, whose shifts are measured then; None to measure none.
 
     Attributes
     ----------
@@ -64,7 +75,13 @@ class Session:
         One thread that fuses evidence while detection goes on; None to fuse in the caller's.
     """
 
-    def __init__(self, pipeline: Pipeline, foregrounds: Sequence[ViewForeground], first: int) -> None:
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        foregrounds: Sequence[ViewForeground],
+        first: int,
+        factors: Sequence[int] | None = None,
+    ) -> None:
         self.pipeline, self.foregrounds, self.watch = pipeline, foregrounds, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         cameras = [camera.name for camera in pipeline.rig.cameras]
@@ -72,11 +89,16 @@ class Session:
         self._estimates = pipeline.detector.new_estimates()
         self._error_rates = pipeline.occupancy.new_error_rates()
         self._records: dict[int, FrameRecord] = {}
+        self._factors, self._shifts = factors, dict[int, Rows]()
         self.fusion: Executor | None = None
         self._open: deque[Future[FusedEvidence]] = deque()
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
         """The foreground of all views; to be called once for each frame set, in the order of time."""
+        if self._factors is not None and shift_is_due(frame_set.frame, self.pipeline.rig.frame_rate):
+            monitors = [foreground.background for foreground in self.foregrounds]
+            images = [None if monitor is None else monitor.model.background_image() for monitor in monitors]
+            self._shifts[frame_set.frame] = image_shifts(frame_set.frame, frame_set.views, images, self._factors)
         with self.watch.time("foreground"):
             views = zip(self.foregrounds, self._frozen.without(frame_set.views), strict=True)
             return [foreground.evidence(view) for foreground, view in views]
@@ -103,7 +125,8 @@ class Session:
         fusion = self._submit(frame, used, explanation, noise)
         with self.watch.time("appearance"):
             appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, used, frame_set.images)
-        self._records[frame] = FrameRecord(explanation, fusion, appearance, events)
+        shifts = self._shifts.pop(frame, np.zeros(0, SHIFT))
+        self._records[frame] = FrameRecord(explanation, fusion, appearance, events, shifts)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
         with self.watch.time("tracking"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, used))
@@ -164,12 +187,13 @@ def run_session(
     first: int,
     advance: Callable[[int], None],
     cores: Callable[[], int] = two_cores,
+    factors: Sequence[int] | None = None,
 ) -> Iterator[CommittedFrames]:
     """The results of frame sets in a session of their own, each as soon as it is decided.
 
     Parameters
     ----------
-    pipeline, foregrounds, first
+    pipeline, foregrounds, first, factors
         As of `Session`.
     frame_sets
         In the order of time.
@@ -179,7 +203,7 @@ def run_session(
         Processor cores for this session from the next frame on; with one it has no threads but those that decode.
     """
     with ExitStack() as threads:
-        session = Session(pipeline, foregrounds, first)
+        session = Session(pipeline, foregrounds, first, factors)
         for frame_set, evidence in _prepared(session, iter(frame_sets), cores, threads):
             yield from session.add(frame_set, evidence)
             advance(frame_set.frame)

@@ -8,8 +8,7 @@ from stseg.foreground.background.mixture import Mixture
 from stseg.foreground.background.model import Background
 from stseg.foreground.background.registry import make_background
 from stseg.foreground.illumination import IlluminationMonitor, LightChange
-from stseg.foreground.instances import instance_boxes
-from stseg.foreground.masks import mask_likelihood
+from stseg.foreground.view_foreground import instance_boxes, mask_likelihood
 
 __all__ = [
     "Background",

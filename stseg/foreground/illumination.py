@@ -26,7 +26,6 @@ from stseg.arrays import Bytes, Flags, Singles
 from stseg.config import IlluminationConfig
 from stseg.foreground.background.model import Background
 from stseg.foreground.gain_field import gain_field
-from stseg.kernels.accelerate import kernel
 
 _STRIDE = 4  # pixels; a sixteenth of them are ample for a share
 _FAINT_SHARE = 0.25  # of the rise that is a change: from there on a smooth field is tried
@@ -114,7 +113,7 @@ class IlluminationMonitor:
 
     def _share(self, likelihood: Singles) -> float:
         """Share of the view with a likelihood above the prior."""
-        return _share_above(likelihood, np.float32(self.model.prior))
+        return float((likelihood[::_STRIDE, ::_STRIDE] > np.float32(self.model.prior)).mean())
 
     def _share_rise(self, likelihood: Singles) -> float:
         """Rise of that share within the window."""
@@ -173,17 +172,6 @@ def _is_broad(gain: Singles) -> bool:
     logarithm = np.log(gain[::_STRIDE, ::_STRIDE])
     differs = np.abs(logarithm - np.median(logarithm, axis=(0, 1))).max(-1) > _FIELD_DEVIATION
     return bool(differs.mean() > _FIELD_SHARE)
-
-
-@kernel
-def _share_above(likelihood: Singles, bound: np.float32) -> float:
-    """Share of the pixels (v, u), of every `_STEP`-th along each axis, that are above a bound."""
-    above, count = 0, 0
-    for v in range(0, likelihood.shape[0], _STRIDE):
-        for u in range(0, likelihood.shape[1], _STRIDE):
-            above += 1 if likelihood[v, u] > bound else 0
-            count += 1
-    return above / count
 
 
 @dataclass(slots=True)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import find_objects
 
-from stseg.arrays import Boxes, Observation, Singles, ViewEvidence
-from stseg.foreground.illumination import IlluminationMonitor, LightChange
-from stseg.foreground.instances import instance_boxes
-from stseg.foreground.masks import mask_likelihood
+from stseg.arrays import Boxes, Bytes, Observation, Singles, ViewEvidence
+from stseg.errors import SourceError
+from stseg.foreground.illumination import IlluminationMonitor
 from stseg.kernels.accelerate import wide_kernel
+
+_LIKELIHOOD_OF_GREY = np.arange(256, dtype=np.float32) / np.float32(255)
 
 
 class ViewForeground:
@@ -22,11 +25,6 @@ class ViewForeground:
 
     def __init__(self, background: IlluminationMonitor | None = None) -> None:
         self.background = background
-
-    @property
-    def light_changes(self) -> list[LightChange]:
-        """Sudden illumination changes, in frames since the first."""
-        return [] if self.background is None else self.background.changes
 
     def evidence(self, observation: Observation) -> ViewEvidence:
         """Evidence of a frame; colour frames also update the background model."""
@@ -86,3 +84,52 @@ def _divide_prior_out(posterior: Singles, prior: np.float32, likelihood: Singles
     for i in range(len(given)):
         body, empty = given[i] * (one - prior), (one - given[i]) * prior
         filled[i] = body / (body + empty)
+
+
+def mask_likelihood(mask: Bytes) -> Singles:
+    """Foreground likelihood of a mask image.
+
+    Parameters
+    ----------
+    mask : uint8 (v, u)
+        0..255: certainly background to certainly foreground.
+
+    Returns
+    -------
+    float32 (v, u)
+        mask / 255. The fusion accounts for the segmenter's error rates.
+
+    Raises
+    ------
+    SourceError
+        Where it is not a grey image.
+    """
+    if mask.ndim != 2 or mask.dtype != np.uint8:
+        raise SourceError("mask", "", f"{mask.dtype} {mask.shape}", "uint8 (v, u)")
+    return np.asarray(_LIKELIHOOD_OF_GREY[mask])
+
+
+def instance_boxes(instances: NDArray[np.uint16]) -> Boxes:
+    """The tight box around each instance.
+
+    Parameters
+    ----------
+    instances : uint16 (v, u)
+        One value an instance, 0 for background.
+
+    Returns
+    -------
+    Boxes
+        In increasing order of the values that occur, score 1. Pixel centres are integers, so the box of the single
+        pixel (u, v) is (u - 0.5, v - 0.5, 1, 1).
+
+    Raises
+    ------
+    SourceError
+        Where it is not an indexed image.
+    """
+    if instances.ndim != 2 or instances.dtype != np.uint16:
+        raise SourceError("instances", "", f"{instances.dtype} {instances.shape}", "uint16 (v, u)")
+    found = filter(None, find_objects(instances))  # None for values that do not occur
+    pixel = [(u.start - 0.5, v.start - 0.5, u.stop - u.start, v.stop - v.start) for v, u in found]
+    return Boxes(np.array(pixel, float).reshape(-1, 4), np.ones(len(pixel)))

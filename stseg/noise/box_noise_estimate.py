@@ -20,8 +20,17 @@ from functools import cached_property
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.bodies.box_fit import LOWER_EDGE_ABOVE, LOWER_EDGE_BELOW, TOLERANCE, WIDTH_OFFSET, fill_offsets
-from stseg.bodies.box_noise import PRIOR_NOISE, SCORE_KNOTS, BoxNoise, knots_of
+from stseg.bodies.box_fit import (
+    LOWER_EDGE_ABOVE,
+    LOWER_EDGE_BELOW,
+    PRIOR_NOISE,
+    SCORE_KNOTS,
+    TOLERANCE,
+    WIDTH_OFFSET,
+    BoxNoise,
+    fill_offsets,
+    knots_of,
+)
 from stseg.bodies.views import BoxView, View, ViewObservation
 from stseg.config import ErrorRateConfig
 from stseg.records.forgetting import Forgetting

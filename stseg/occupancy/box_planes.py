@@ -37,7 +37,7 @@ class ViewBoxes(NamedTuple):
     edges : float64 (box, 4)
         left, top, right, bottom, pixels, within the image.
     tolerance : float64 (box, 5), belief : float64 (box,)
-        See `stseg.bodies.box_noise`.
+        See `stseg.bodies.box_fit`.
     person : int64 (box,)
         The person that each box is assigned to, -1 for none.
     width, height

@@ -11,13 +11,9 @@ from stseg.bodies.pillars import BodyTable
 from stseg.config import BodyConfig, LabelConfig
 from stseg.geometry import Camera, Rig
 from stseg.graphcut.expansion import expand
-from stseg.pixel_labels.adjacency import edge_costs
-from stseg.pixel_labels.appearance import Appearance, BodyRows, ColourSums
-from stseg.pixel_labels.body_masks import pillar_patches
-from stseg.pixel_labels.colour_ratios import colour_log_ratios
-from stseg.pixel_labels.label_likelihood import LabelLikelihood, visible_shares
-from stseg.pixel_labels.pixel_energy import admissible, most_likely_labels, pixel_energy
-from stseg.pixel_labels.placed_people import PlacedPeople
+from stseg.pixel_labels.appearance import Appearance, BodyRows, ColourSums, colour_log_ratios
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, PlacedPeople, pillar_patches, visible_shares
+from stseg.pixel_labels.pixel_energy import admissible, edge_costs, most_likely_labels, pixel_energy
 
 
 class ViewLabels:

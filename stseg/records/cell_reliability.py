@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Rows, Singles
-from stseg.bodies.filled_cells import inside_bodies
+from stseg.bodies.pillars import inside_bodies
 from stseg.geometry.grid import Grid
 from stseg.geometry.nearest_person import nearest_person
 

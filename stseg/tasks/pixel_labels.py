@@ -20,7 +20,7 @@ from stseg.io.recording.frames import FrameSet, open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
 from stseg.pixel_labels.appearance import Appearance, ColourSums
-from stseg.pixel_labels.placed_people import PlacedPeople
+from stseg.pixel_labels.label_likelihood import PlacedPeople
 from stseg.pixel_labels.views import ViewLabels, view_labels
 from stseg.reporting.pictures.colours import track_palette
 

@@ -7,10 +7,8 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run
-from stseg.view_health.body_warnings import body_warnings
-from stseg.view_health.knock_detection import find_knocks
-from stseg.view_health.run_check import find_residual_step, views_off
-from stseg.view_health.silent_views import view_warnings
+from stseg.view_health.knock_detection import find_knocks, find_residual_step, views_off
+from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 _MOVED = 1.0
 """Least shift of an image that counts as a moved camera, pixels."""

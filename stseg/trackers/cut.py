@@ -14,8 +14,8 @@ from stseg.arrays import Flags, Ints, Labels, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.sampling import Sampling
+from stseg.graphcut.cut import greatest_empty_set
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
-from stseg.graphcut.reduction import greatest_empty_set
 from stseg.graphcut.solvers import SOLVERS, find_solver
 from stseg.records.blobs import Blobs
 from stseg.records.predicted_tracks import PredictedTracks

@@ -1,21 +1,22 @@
-"""Change detection for a camera that was knocked while it recorded.
+"""Change detection for a camera that was knocked while it recorded, and views that are wrong throughout.
 
 Input is an agreement score of each frame and view, higher is better: either the shift of the view's background
-(`background_shift`), which shows a knock of a pixel, or its residual against the other views
-(`stseg.view_health.run_check`), which needs no picture but a larger knock. A knock is a downward step of one view's
-score relative to the median of the others: where all fall at once, the scene changed (a crowd, the light).
+(`stseg.view_health.image_shifts`), which shows a knock of a pixel, or its residual against the other views, which
+needs no picture but a larger knock. A knock is a downward step of one view's score relative to the median of the
+others: where all fall at once, the scene changed (a crowd, the light).
+
+The residuals are those of the detector (`reprojection_residuals`), window by window. A wrong view draws detections
+towards itself: its residual understates its error. Views along the same line of sight get residuals too. With three
+views, or two that face each other, positions cannot decide which is wrong; all views as far off are reported.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
-import cv2
 import numpy as np
-from scipy.fft import irfft2, rfft2
 
-from stseg.arrays import Bytes, Floats, Singles
+from stseg.arrays import Floats
 
 _LEAST_FRAMES = 20
 """Least number of scored frames on either side of a step."""
@@ -23,8 +24,12 @@ _STEP_ERRORS = 6.0
 """Least size of a step, in its standard errors."""
 _STEP_DEVIATIONS = 1.0
 """Least size of a step, in standard deviations of single frames; smaller ones are harmless."""
-_PEAK_RADIUS = 2
-"""Radius of the sub-pixel centroid around a correlation peak, pixels."""
+_LEAST_WINDOWS = 5
+"""Windows with a residual that a view needs."""
+_RESIDUAL_ERRORS = 3.0
+"""Least residual in standard errors."""
+_REPORTED_SHARE = 0.6
+"""Share of the largest residual from which a view is reported too."""
 
 
 @dataclass(frozen=True)
@@ -62,50 +67,6 @@ def find_knocks(agreement: Floats, least: float = 0.0) -> list[Knock]:
     """
     found = [_step(agreement, view, least) for view in range(agreement.shape[1])]
     return [knock for knock in found if knock is not None]
-
-
-def background_shift(background: Bytes, image: Bytes) -> Floats:
-    """Shift (u, v) of an image's edges against the background, pixels, float64 (2,).
-
-    Phase correlation of the edges (Kuglin and Hines, The phase correlation image alignment method, 1975), which people
-    and changes of light disturb little.
-
-    Parameters
-    ----------
-    background, image : uint8 (v, u, 3)
-        Of one size.
-    """
-    # With SciPy's transforms: OpenCV's differ in the last digits from one call to the next.
-    one, other = (rfft2(_edges(picture) * _window(*picture.shape[:2])) for picture in (background, image))
-    crossed = np.conj(one) * other
-    likeness = irfft2(crossed / np.maximum(np.abs(crossed), np.float32(1e-12)), image.shape[:2])
-    return _peak(np.asarray(likeness))
-
-
-@lru_cache(maxsize=8)  # shapes of a rig's images
-def _window(rows: int, columns: int) -> Singles:
-    """Hann window: the image's borders would otherwise count as edges that do not move."""
-    return np.outer(np.hanning(rows), np.hanning(columns)).astype(np.float32)
-
-
-def _peak(likeness: Singles) -> Floats:
-    """Sub-pixel position (u, v) of the correlation peak: the centroid around the highest pixel."""
-    middle = np.array(likeness.shape) // 2
-    centred = np.roll(likeness, tuple(middle), (0, 1))
-    v, u = map(int, np.unravel_index(int(np.argmax(centred)), centred.shape))
-    rows = np.arange(max(v - _PEAK_RADIUS, 0), min(v + _PEAK_RADIUS + 1, centred.shape[0]))
-    columns = np.arange(max(u - _PEAK_RADIUS, 0), min(u + _PEAK_RADIUS + 1, centred.shape[1]))
-    weight = np.maximum(centred[np.ix_(rows, columns)], 0.0)
-    centre = np.array([weight.sum(0) @ columns, weight.sum(1) @ rows]) / max(float(weight.sum()), 1e-12)
-    return np.asarray(centre - middle[::-1])
-
-
-def _edges(image: Bytes) -> Singles:
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    across, down = (np.asarray(cv2.Sobel(grey, cv2.CV_16S, *step), np.float32) for step in ((1, 0), (0, 1)))
-    # The fourth root, so that strong edges count little more than weak ones. Roots are rounded exactly, logarithms are
-    # not: equal pictures give equal results to the last bit.
-    return np.asarray(np.sqrt(np.sqrt(across**2 + down**2)))
 
 
 def _step(agreement: Floats, view: int, least: float) -> Knock | None:
@@ -155,3 +116,57 @@ def _frames_per_sample(residual: Floats) -> float:
     correlation = float((residual[1:] * residual[:-1]).sum() / max(float((residual**2).sum()), 1e-12))
     correlation = min(max(correlation, 0.0), 0.95)
     return (1 + correlation) / (1 - correlation)
+
+
+@dataclass(frozen=True)
+class ViewResidual:
+    """A view with a systematic residual across its line of sight.
+
+    Attributes
+    ----------
+    view
+        Its number.
+    metres
+        Median residual, positive to the right of the image.
+    """
+
+    view: int
+    metres: float
+
+
+def views_off(residuals: Floats, cell: float) -> list[ViewResidual]:
+    """Views with the largest residuals where these exceed a cell; largest first.
+
+    Parameters
+    ----------
+    residuals : float64 (window, view)
+        Metres; nan where a view has no measurement.
+    cell
+        Side of a cell, metres.
+    """
+    median = np.array([_clear_median(view_residuals[np.isfinite(view_residuals)]) for view_residuals in residuals.T])
+    order = np.argsort(-np.abs(median), kind="stable")
+    farthest = float(np.abs(median).max(initial=0.0))
+    named = [int(view) for view in order if abs(median[view]) >= _REPORTED_SHARE * farthest]
+    return [ViewResidual(view, float(median[view])) for view in named] if farthest > cell else []
+
+
+def _clear_median(residuals: Floats) -> float:
+    """The median, 0 where there are few measurements or it is not significant."""
+    if len(residuals) < _LEAST_WINDOWS:
+        return 0.0
+    median = float(np.median(residuals))
+    error = _spread(residuals) / np.sqrt(len(residuals))
+    return median if abs(median) > _RESIDUAL_ERRORS * error else 0.0
+
+
+def find_residual_step(residuals: Floats, cell: float) -> Knock | None:
+    """The largest step of a residual by half a cell or more: a knocked camera; None where there is none.
+
+    The knock's `frame` is the index of a window; `before` and `after` are in metres.
+    """
+    steps = [(side, knock) for side in (1.0, -1.0) for knock in find_knocks(side * residuals, cell / 2)]
+    if not steps:
+        return None
+    side, knock = max(steps, key=lambda step: abs(step[1].before - step[1].after))
+    return Knock(knock.view, knock.frame, side * knock.before, side * knock.after, knock.errors)

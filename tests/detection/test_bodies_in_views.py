@@ -13,8 +13,7 @@ from scenes import corner_cameras, likelihoods, looking, people, room
 from strategies import numbers
 
 from stseg.arrays import Floats
-from stseg.bodies.box_fit import TOLERANCE, fill_inside, fill_match, half_square
-from stseg.bodies.box_noise import PRIOR_NOISE
+from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, fill_inside, fill_match, half_square
 from stseg.bodies.outlines import outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable

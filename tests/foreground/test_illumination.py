@@ -141,8 +141,7 @@ def test_a_blind_view_has_no_evidence_and_says_when() -> None:
     seen = [sight.evidence(other_scene) for _ in range(12)]
     assert seen[0] is None
     assert all(one is not None for one in seen[10:])
-    assert sight.light_changes == [LightChange(EVENT + 1, EVENT + 9, 9)]
-    assert ViewForeground().light_changes == []
+    assert watch.changes == [LightChange(EVENT + 1, EVENT + 9, 9)]
 
 
 @settings(max_examples=15, deadline=None)

@@ -19,11 +19,8 @@ from scipy.sparse.csgraph import maximum_flow
 from stseg.config import SegmentationConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
-from stseg.graphcut import pymaxflow
-from stseg.graphcut.cut import Cut, minimum_cut
+from stseg.graphcut.cut import Cut, minimum_cut, reduce
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
-from stseg.graphcut.pymaxflow import grid_cut
-from stseg.graphcut.reduction import reduce
 from stseg.graphcut.sign_sets import LABEL_ONE, UNDECIDED
 from stseg.graphcut.solvers import SOLVERS, Solver, find_solver
 from stseg.graphcut.sparse import CAPACITY_LIMIT, sparse_cut
@@ -132,7 +129,9 @@ def test_the_cut_is_the_smallest_of_the_minima(shape: tuple[int, ...]) -> None:
         occupied = minimum_cut(energy).occupied
         assert energy.of(occupied) == least, seed
         np.testing.assert_array_equal(occupied, smallest, err_msg=f"seed {seed}")
-        np.testing.assert_array_equal(grid_cut(energy).occupied, smallest, err_msg=f"PyMaxflow, seed {seed}")
+        np.testing.assert_array_equal(
+            SOLVERS["pymaxflow"].grid(energy).occupied, smallest, err_msg=f"PyMaxflow, seed {seed}"
+        )
 
 
 def flow_value(energy: GridEnergy) -> int:
@@ -157,7 +156,7 @@ def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, nei
         else:
             strength = {8: 0.8, 80: 0.1}[neighbours] * (3 if kind == "smooth volume" else 1)
             energy = smooth_window(seed, shape, neighbours, strength)
-        expected = grid_cut(energy).occupied
+        expected = SOLVERS["pymaxflow"].grid(energy).occupied
         # Least energy, relative to all background, is the least cut less what all background loses.
         assert energy.of(expected) == flow_value(energy) - int(energy.unary.clip(0).sum())
         cut = minimum_cut(energy)
@@ -171,7 +170,7 @@ def test_the_reduction_is_exact(seed: int, strength: int, neighbours: int) -> No
     energy = window(seed, (3, 2, 4, 5), unary=strength, capacity=4, neighbours=neighbours)
     reduced = reduce(energy)
     np.testing.assert_array_equal(reduced.left, np.flatnonzero(reduced.state == UNDECIDED))
-    expected = grid_cut(energy).occupied
+    expected = SOLVERS["pymaxflow"].grid(energy).occupied
     shape = (3, 3, 5, 6)
     state = reduced.state[: np.prod(shape)].reshape(shape)[:, 1:, 1:, 1:]
     np.testing.assert_array_equal(state[state != UNDECIDED] == LABEL_ONE, expected[state != UNDECIDED])
@@ -235,7 +234,7 @@ def test_sparse_cut_of_any_graph(seed: int, nodes: int, edges: int) -> None:
     start, end = start[start != end], end[start != end]
     forward, backward = rng.integers(0, 6, (2, len(start)))
     occupied = sparse_cut(unary, start, end, forward, backward)
-    np.testing.assert_array_equal(occupied, pymaxflow.sparse_cut(unary, start, end, forward, backward))
+    np.testing.assert_array_equal(occupied, SOLVERS["pymaxflow"].sparse(unary, start, end, forward, backward))
 
 
 def test_sparse_cut_of_extremes() -> None:
@@ -280,7 +279,7 @@ def test_real_windows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert track(write_recording(tmp_path), tmp_path / "run.h5", "--frames", "0:10") == 0
     assert energies
     for energy in energies:
-        expected = grid_cut(energy).occupied
+        expected = SOLVERS["pymaxflow"].grid(energy).occupied
         assert expected.any()
         np.testing.assert_array_equal(minimum_cut(energy).occupied, expected)
 

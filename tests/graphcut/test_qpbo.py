@@ -8,8 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stseg.graphcut import pymaxflow, qpbo
+from stseg.graphcut import qpbo
 from stseg.graphcut.qpbo import QuadraticEnergy, minimise
+from stseg.graphcut.solvers import SOLVERS
 from stseg.graphcut.sparse import sparse_cut
 
 
@@ -29,7 +30,7 @@ def least(energy: QuadraticEnergy) -> int:
 @given(st.integers(0, 9999), st.integers(1, 9), st.integers(0, 20), st.sampled_from([(-5, 0), (-5, 5), (0, 5)]))
 def test_the_minimum_is_that_of_all_labellings(seed: int, nodes: int, edges: int, weights: tuple[int, int]) -> None:
     energy = random_energy(seed, nodes, edges, *weights)
-    for cut in (sparse_cut, pymaxflow.sparse_cut):
+    for cut in (sparse_cut, SOLVERS["pymaxflow"].sparse):
         found = minimise(energy, cut)
         assert energy.of(found.labels) == least(energy)
         assert found.gap == 0

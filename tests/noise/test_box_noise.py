@@ -11,8 +11,17 @@ from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, people, rig_of
 
 from stseg.arrays import Boxes, Floats
-from stseg.bodies.box_fit import EDGE_GRAIN, LOWER_EDGE_BELOW, TOLERANCE, WIDTH_OFFSET, half_square
-from stseg.bodies.box_noise import EFFECTIVE_OBSERVATIONS, PRIOR_NOISE, SCORE_KNOTS, BoxNoise
+from stseg.bodies.box_fit import (
+    EDGE_GRAIN,
+    EFFECTIVE_OBSERVATIONS,
+    LOWER_EDGE_BELOW,
+    PRIOR_NOISE,
+    SCORE_KNOTS,
+    TOLERANCE,
+    WIDTH_OFFSET,
+    BoxNoise,
+    half_square,
+)
 from stseg.config import ErrorRateConfig
 from stseg.detection.detector import Detector
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, likelihoods, no_boxes, people, rig_of
 
 from stseg.arrays import Flags, Floats, Ints, ViewEvidence
-from stseg.bodies.filled_cells import inside_bodies
+from stseg.bodies.pillars import inside_bodies
 from stseg.config import ErrorRateConfig, OccupancyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Grid

@@ -13,11 +13,8 @@ from scenes import corner_cameras, likelihoods, people, room
 from stseg.arrays import Bytes, Floats, Ints
 from stseg.bodies.pillars import BodyTable
 from stseg.config import BodyConfig, LabelConfig
-from stseg.pixel_labels.appearance import SLICES, Appearance, BodyRows, ColourSums
-from stseg.pixel_labels.body_masks import Patches
-from stseg.pixel_labels.colour_ratios import colour_log_ratios
-from stseg.pixel_labels.label_likelihood import LabelLikelihood
-from stseg.pixel_labels.placed_people import PlacedPeople
+from stseg.pixel_labels.appearance import SLICES, Appearance, BodyRows, ColourSums, colour_log_ratios
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, Patches, PlacedPeople
 from stseg.pixel_labels.views import ViewLabels
 
 TRACKS = np.array([4, 9])

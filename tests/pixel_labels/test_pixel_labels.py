@@ -18,11 +18,8 @@ from stseg.config import BodyConfig, LabelConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Camera
 from stseg.graphcut.grid_energy import QUANTUM
-from stseg.pixel_labels.adjacency import edge_costs
-from stseg.pixel_labels.body_masks import Patches, pillar_patches
-from stseg.pixel_labels.label_likelihood import LabelLikelihood, visible_shares
-from stseg.pixel_labels.pixel_energy import PixelEnergy, most_likely_labels, pixel_energy
-from stseg.pixel_labels.placed_people import PlacedPeople
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, Patches, PlacedPeople, pillar_patches, visible_shares
+from stseg.pixel_labels.pixel_energy import PixelEnergy, edge_costs, most_likely_labels, pixel_energy
 from stseg.pixel_labels.views import ViewLabels, view_labels
 
 EXACT = LabelConfig(samples=1, position_noise=1e-3, height_noise=0.0)

@@ -61,7 +61,7 @@ AT_HOME = {
     "cv2": ("stseg.io", "stseg.reporting", "stseg.simulation", "stseg.calibration", "stseg.view_health"),
     "PIL": ("stseg.io",),
     "numba": ("stseg.kernels",),
-    "maxflow": ("stseg.graphcut.pymaxflow",),
+    "maxflow": ("stseg.graphcut.solvers",),
     "cyclopts": ("stseg.commands",),
     "rich": ("stseg.commands",),
     "distributed": ("stseg.engine.workers.cluster",),  # imported where a scheduler is asked for

@@ -11,8 +11,7 @@ from stseg.config import BodyConfig
 from stseg.io.runfile.layout import ghost_type
 from stseg.records.ghost_reasons import DENIED, OTHERS, TOO_LITTLE, ghost_reasons
 from stseg.records.tables import RATES, TRAJECTORY
-from stseg.view_health.body_warnings import body_warnings
-from stseg.view_health.silent_views import view_warnings
+from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 FRAMES = np.arange(100, 400)
 

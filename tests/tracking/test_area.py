@@ -10,7 +10,7 @@ from scenes import boxes, found, people, room
 
 from stseg import Tracker
 from stseg.arrays import Floats, Observation
-from stseg.engine.area import within_area
+from stseg.engine.committed_frames import within_area
 from stseg.geometry import Grid, Rig
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import EVENT, TRAJECTORY, WINDOW

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stseg.arrays import Boxes, Observation
-from stseg.view_health.frozen_views import FrozenViews
+from stseg.view_health.blind_views import FrozenViews
 
 KINDS = ("masks", "colour", "boxes")
 

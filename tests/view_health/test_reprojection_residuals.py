@@ -9,7 +9,8 @@ from stseg.arrays import Bytes, Floats
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
 from stseg.simulation.rendering.room import render_room
-from stseg.view_health.knock_detection import background_shift, find_knocks
+from stseg.view_health.image_shifts import background_shift
+from stseg.view_health.knock_detection import find_knocks
 
 
 def correlated(frames: int, views: int, seed: int, correlation: float = 0.6) -> Floats:

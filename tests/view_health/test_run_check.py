@@ -18,7 +18,7 @@ from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.runfile.runs import read_run
 from stseg.kernels.accelerate import python_form
 from stseg.tasks.overview import summarise_run
-from stseg.view_health.run_check import find_residual_step, views_off
+from stseg.view_health.knock_detection import find_residual_step, views_off
 
 CELL = 0.1
 slow = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")

@@ -15,7 +15,6 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.engine.committed_frames import CommittedFrames
-from stseg.engine.live.blind_views import BlindViews
 from stseg.engine.live.live_foreground import LiveForegrounds
 from stseg.engine.live.open_segment import OpenSegment
 from stseg.engine.offline.assembly import FinishedSegment
@@ -32,6 +31,7 @@ from stseg.trackers import find_tracker
 from stseg.tracking.windows.windows import window_length
 from stseg.trajectories.live_corrections import LiveCorrections, renamed
 from stseg.trajectories.live_ids import LiveIds
+from stseg.view_health.blind_views import BlindViews
 
 
 class LiveRun:
@@ -117,7 +117,7 @@ class LiveRun:
     def add(self, frame_set: FrameSet) -> None:
         """Process the next frame set."""
         self.foregrounds.update(frame_set, self._since)
-        self._blind_views.note(frame_set)
+        self._blind_views.note(frame_set.frame, frame_set.views, frame_set.dropped)
         self._arrived[frame_set.frame] = frame_set.arrived
         self._stop = frame_set.frame + 1
         while self._coming is not None and frame_set.frame >= self._coming.lead:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from stseg.arrays import Rows
 from stseg.engine.committed_frames import CommittedFrames
-from stseg.engine.image_shift import ImageShifts
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
@@ -45,9 +44,8 @@ class OpenSegment:
     ) -> None:
         self.segment, self.warm_up = segment, list[Rows]()
         self.names: Names | None = None
-        self._session = Session(pipeline, foregrounds, segment.lead)
-        self._shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
-        self._writer = SegmentWriter(job, segment, pipeline.occupancy.views, self._shifts, draft)
+        self._session = Session(pipeline, foregrounds, segment.lead, job.read.factors)
+        self._writer = SegmentWriter(job, segment, pipeline.occupancy.views, draft)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []
         """Steps beyond the planned end; part of this segment only if it is the last of the run."""
         self._committed = segment.lead
@@ -63,7 +61,6 @@ class OpenSegment:
 
     def add(self, frame_set: FrameSet) -> list[CommittedFrames]:
         """Process the next frame set; the frames that it commits."""
-        self._shifts.measure(frame_set)
         return self._session.add(frame_set)
 
     def finish(self) -> list[CommittedFrames]:

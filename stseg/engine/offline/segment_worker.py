@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from copy import deepcopy
 from pathlib import Path
 
-from stseg.engine.image_shift import ImageShifts
 from stseg.engine.offline.backgrounds import BackgroundFrames, background_frames, make_foregrounds
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_writer import SegmentWriter
@@ -58,16 +57,16 @@ class SegmentWorker:
             advance(int(segment.first <= frame < segment.stop))
 
         foregrounds = self.foregrounds(segment)
-        shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
         end = min(end for end in self._ends if end >= segment.stop)
         with (
             open_frames(job.read, segment.lead, end, job.streams) as frame_sets,
-            SegmentWriter(job, segment, self.pipeline.occupancy.views, shifts, draft) as writer,
+            SegmentWriter(job, segment, self.pipeline.occupancy.views, draft) as writer,
             ExitStack() as threads,
         ):
             packing: Executor | None = None
-            observed = shifts.measured(frame_sets)
-            for step in run_session(self.pipeline, foregrounds, observed, segment.lead, fused, self.cores):
+            for step in run_session(
+                self.pipeline, foregrounds, frame_sets, segment.lead, fused, self.cores, job.read.factors
+            ):
                 if packing is None and self.cores() > 1:
                     packing = threads.enter_context(ThreadPoolExecutor(1, "packing"))
                 writer.write(step, executor=packing)

@@ -13,7 +13,6 @@ import numpy as np
 
 from stseg.arrays import Bytes, Labels, Rows, Singles
 from stseg.engine.committed_frames import CommittedFrames
-from stseg.engine.image_shift import ImageShifts
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
 from stseg.geometry.nearest_person import nearest_person
@@ -64,15 +63,13 @@ class SegmentWriter(AbstractContextManager["SegmentWriter"]):
         The run, and the segment; its end may be changed while it is written.
     views : uint8 (plane, y, x)
         Number of views that see each cell.
-    shifts
-        Measured shifts of the cameras' images.
     draft
         Path of the file until it is complete.
     """
 
-    def __init__(self, job: Job, segment: Segment, views: Bytes, shifts: ImageShifts, draft: Path) -> None:
+    def __init__(self, job: Job, segment: Segment, views: Bytes, draft: Path) -> None:
         self.segment = segment
-        self._job, self._shifts, self._draft = job, shifts, draft
+        self._job, self._draft = job, draft
         self._steps = deque[_Step]()
         self._opened = ExitStack()
         self._writer = self._opened.enter_context(
@@ -113,7 +110,6 @@ class SegmentWriter(AbstractContextManager["SegmentWriter"]):
         """Complete the file; its path, whose name has the checksum."""
         while self._steps:
             self._append(self._steps.popleft())
-        self._writer.append("shifts", self._shifts.rows(self.segment.first, self.segment.stop))
         self._writer.finish(np.zeros(0, TRACK))
         self._opened.close()
         return keep_segment(self._draft)
@@ -135,6 +131,7 @@ class SegmentWriter(AbstractContextManager["SegmentWriter"]):
             writer.append("windows", results.commit.windows)
             writer.append("rates", results.rates)
             writer.append("appearance", results.appearance)
+            writer.append("shifts", results.shifts)
         writer.append("events", step.events)
 
 
