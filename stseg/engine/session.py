@@ -15,11 +15,11 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Observation, Rows, Singles, ViewEvidence
+from stseg.arrays import Rows, Singles, ViewEvidence
 from stseg.bodies.box_fit import BoxNoise
 from stseg.engine.committed_frames import (
     CommittedFrames,
@@ -32,6 +32,7 @@ from stseg.engine.committed_frames import (
 )
 from stseg.engine.pipeline import Pipeline
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
 from stseg.records.tables import SHIFT
 from stseg.trackers import Commit, FrameObservations, FusedFrame
@@ -42,17 +43,6 @@ _AHEAD = 2
 """Frames whose foreground is made before their detection."""
 _BEHIND = 4
 """Frames whose fusion may be open while detection goes on."""
-
-
-class FrameSet(Protocol):
-    """The observations of all cameras at one time (`stseg.io.recording.frames.FrameSet`)."""
-
-    @property
-    def frame(self) -> int: ...
-    @property
-    def views(self) -> Sequence[Observation]: ...
-    @property
-    def images(self) -> Sequence[Observation]: ...
 
 
 class Session:
