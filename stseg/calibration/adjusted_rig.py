@@ -18,36 +18,25 @@ _MARGIN = 0.5
 
 @dataclass(frozen=True)
 class ViewReport:
-    """Agreement of one view with the others.
-
-    Attributes
-    ----------
-    observations
-        Number of endpoint pairs (a person in a frame) that this view shares with another.
-    foot_pixels, head_pixels
-        Median reprojection errors of feet and heads.
-    ground_metres
-        Median distance on the ground between this view's feet and the adjusted points.
-    head_metres
-        Median difference between this view's head heights and the adjusted ones.
-    focal, focal_spread
-        Focal length and its standard deviation, pixels.
-    centre_spread
-        Standard deviation of the camera centre, metres.
-    clock, clock_spread
-        Residual delay beyond whole frames, and its standard deviation, seconds.
-    """
+    """Agreement of one view with the others."""
 
     observations: int
+    """Number of endpoint pairs (a person in a frame) that this view shares with another."""
     foot_pixels: float
     head_pixels: float
+    """Median reprojection errors of feet and heads."""
     ground_metres: float
+    """Median distance on the ground between this view's feet and the adjusted points."""
     head_metres: float
+    """Median difference between this view's head heights and the adjusted ones."""
     focal: float
     focal_spread: float
+    """Focal length and its standard deviation, pixels."""
     centre_spread: float
+    """Standard deviation of the camera centre, metres."""
     clock: float
     clock_spread: float
+    """Residual delay beyond whole frames, and its standard deviation, seconds."""
 
 
 def scaled(solution: SolvedViews, factor: float) -> SolvedViews:

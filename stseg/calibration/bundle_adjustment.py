@@ -33,79 +33,53 @@ _ITERATIONS = 40
 
 @dataclass(frozen=True)
 class BundleParameters:
-    """Parameters of the adjustment.
-
-    Attributes
-    ----------
-    views : float64 (view, 12)
-        See `stseg.calibration.pinhole`.
-    toe_offset : float64 (2,)
-        Distance from a body's axis to its lowest visible point, towards the camera: metres at rest or walking
-        across, and metres for each m/s along the viewing ray (half a step).
-    points : float64 (n, 3)
-        x, y and head height of each person in each frame, metres.
-    """
+    """Parameters of the adjustment."""
 
     views: Floats
+    """float64 (view, 12): see `stseg.calibration.pinhole`."""
     toe_offset: Floats
+    """float64 (2,): distance from a body's axis to its lowest visible point, towards the camera: metres at rest or
+    walking across, and metres for each m/s along the viewing ray (half a step)."""
     points: Floats
+    """float64 (n, 3): x, y and head height of each person in each frame, metres."""
 
 
 @dataclass(frozen=True)
 class BundleProblem:
-    """Observations of the adjustment, and their weights.
-
-    Attributes
-    ----------
-    size : int64 (view, 2)
-        Width and height of the images, pixels.
-    correspondences
-        Points and their observations.
-    spread : float64 (m, 2, 2)
-        Standard deviation of foot and head along and across the body, in body lengths.
-    height : float64 (n,)
-        Prior mean of each point's head height, metres.
-    height_spread
-        Its standard deviation.
-    redundancy
-        Observations per independent observation: errors within one step are correlated.
-    clock_spread
-        Standard deviation of the residual clock offsets, seconds.
-    make : float64 (view,)
-        Weight of a camera as one of the make of the others, 0..1, see `same_make`.
-    body : float64 (m,)
-        1 for an observation of a person, 0 for one of a floor feature: that has no toe offset, and a head of infinite
-        spread.
-    """
+    """Observations of the adjustment, and their weights."""
 
     size: Ints
+    """int64 (view, 2): width and height of the images, pixels."""
     correspondences: Correspondences
+    """Points and their observations."""
     spread: Floats
+    """float64 (m, 2, 2): standard deviation of foot and head along and across the body, in body lengths."""
     height: Floats
+    """float64 (n,): prior mean of each point's head height, metres."""
     height_spread: float
+    """Its standard deviation."""
     redundancy: float
+    """Observations per independent observation: errors within one step are correlated."""
     clock_spread: float
+    """Standard deviation of the residual clock offsets, seconds."""
     make: Floats
+    """float64 (view,): weight of a camera as one of the make of the others, 0..1, see `same_make`."""
     body: Floats
+    """float64 (m,): 1 for an observation of a person, 0 for one of a floor feature: that has no toe offset, and a head
+    of infinite spread."""
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """Adjusted parameters, their covariance and the residuals.
-
-    Attributes
-    ----------
-    parameters
-    covariance : float64 (12 view + 2, 12 view + 2)
-        Of the cameras and `toe_offset`, marginal over the points; the gauge (turn, shift and time) is spread evenly.
-    residual : float64 (m, 2, 2)
-        Foot and head of each observation, observed minus predicted, along and across the body, in body lengths; nan
-        behind a camera.
-    """
+    """Adjusted parameters, their covariance and the residuals."""
 
     parameters: BundleParameters
     covariance: Floats
+    """float64 (12 view + 2, 12 view + 2): of the cameras and `toe_offset`, marginal over the points; the gauge (turn,
+    shift and time) is spread evenly."""
     residual: Floats
+    """float64 (m, 2, 2): foot and head of each observation, observed minus predicted, along and across the body, in
+    body lengths; nan behind a camera."""
 
 
 def adjust(parameters: BundleParameters, problem: BundleProblem) -> Adjustment:

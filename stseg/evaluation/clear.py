@@ -18,21 +18,15 @@ from stseg.evaluation.sequence import Sequence
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """Matches of a sequence, by frame.
-
-    Attributes
-    ----------
-    frame : int64 (k,)
-        Index in the sequence's list of frames, not the frame's number.
-    person, track : int64 (k,)
-    distance : float64 (k,)
-        Metres.
-    """
+    """Matches of a sequence, by frame."""
 
     frame: Ints
+    """int64 (k,): index in the sequence's list of frames, not the frame's number."""
     person: Ints
     track: Ints
+    """int64 (k,) each."""
     distance: Floats
+    """float64 (k,): metres."""
 
     def __len__(self) -> int:
         return len(self.frame)

@@ -16,40 +16,26 @@ Area = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One evaluated frame.
-
-    Attributes
-    ----------
-    person : int64 (n,)
-        People of the truth, numbered from 0 over the sequence.
-    track : int64 (m,)
-        Tracks present, numbered likewise.
-    distance : float64 (n, m)
-        Metres between them.
-    """
+    """One evaluated frame."""
 
     person: Ints
+    """int64 (n,): people of the truth, numbered from 0 over the sequence."""
     track: Ints
+    """int64 (m,): tracks present, numbered likewise."""
     distance: Floats
+    """float64 (n, m): metres between them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """All evaluated frames, in order; a frame may be empty.
-
-    Attributes
-    ----------
-    frames
-        One entry for each frame of the list, with or without tracks.
-    person_frames : int64 (people,)
-        Number of evaluated frames of each person, above 0.
-    track_frames : int64 (tracks,)
-        The same for tracks.
-    """
+    """All evaluated frames, in order; a frame may be empty."""
 
     frames: tuple[Frame, ...]
+    """One entry for each frame of the list, with or without tracks."""
     person_frames: Ints
+    """int64 (people,): number of evaluated frames of each person, above 0."""
     track_frames: Ints
+    """int64 (tracks,): the same for tracks."""
 
     @property
     def people(self) -> int:

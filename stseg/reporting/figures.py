@@ -25,42 +25,26 @@ _PLAN_SIZE = (900, 1000)
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture.
-
-    Attributes
-    ----------
-    name
-        File name without the suffix.
-    picture : uint8 (v, u, 3)
-        Blue, green, red.
-    caption
-        Caption.
-    """
+    """A picture."""
 
     name: str
+    """File name without the suffix."""
     picture: Bytes
+    """uint8 (v, u, 3): blue, green, red."""
     caption: str
 
 
 @dataclass(frozen=True)
 class Instant:
-    """Contents of one frame's figures.
-
-    Attributes
-    ----------
-    frame
-    log_odds : float (plane, y, x)
-        Nats; nan where no view sees the cell.
-    label : int32 (plane, y, x)
-        Track ids, 0 is background.
-    views
-        Observation of each camera, in the rig's order; None for no camera image.
-    """
+    """Contents of one frame's figures."""
 
     frame: int
     log_odds: AnyArray
+    """float (plane, y, x): nats; nan where no view sees the cell."""
     label: Labels
+    """int32 (plane, y, x): track ids, 0 is background."""
     views: tuple[Observation, ...]
+    """Observation of each camera, in the rig's order; None for no camera image."""
 
 
 def ground_figures(

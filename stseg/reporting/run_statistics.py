@@ -27,22 +27,15 @@ class Span:
 
 
 class DoubtfulStretch(NamedTuple):
-    """Consecutive points of a track that are doubtful.
-
-    Attributes
-    ----------
-    track
-        Its id.
-    first, last
-        Frames, both included.
-    certainty
-        Mean probability of its points, 0..1.
-    """
+    """Consecutive points of a track that are doubtful."""
 
     track: int
+    """Its id."""
     first: int
     last: int
+    """Frames, both included."""
     certainty: float
+    """Mean probability of its points, 0..1."""
 
 
 def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
@@ -118,23 +111,16 @@ def ground_by_views(views: Bytes, inside: Flags, cameras: int) -> Floats:
 
 @dataclass(frozen=True)
 class BusyTime:
-    """A part of a run.
-
-    Attributes
-    ----------
-    first, stop
-        Its frames, half open.
-    mean, most
-        People at a time.
-    come
-        Tracks that begin in it.
-    """
+    """A part of a run."""
 
     first: int
     stop: int
+    """Its frames, half open."""
     mean: float
     most: int
+    """People at a time."""
     come: int
+    """Tracks that begin in it."""
 
 
 def people_by_hour(span: Span, trajectory: Rows) -> list[BusyTime]:

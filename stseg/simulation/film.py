@@ -20,21 +20,14 @@ EMPTY_FRAMES = 40
 
 @dataclass(frozen=True, slots=True)
 class RenderedFrame:
-    """One frame of the recording.
-
-    Attributes
-    ----------
-    frame
-        From 0.
-    truth : TRUTH (n,)
-        People inside the area, see `stseg.simulation.crowd.social_forces`.
-    views
-        One a camera, in the rig's order.
-    """
+    """One frame of the recording."""
 
     frame: int
+    """From 0."""
     truth: Rows
+    """TRUTH (n,): people inside the area, see `stseg.simulation.crowd.social_forces`."""
     views: tuple[RenderedView, ...]
+    """One a camera, in the rig's order."""
 
 
 class SceneFilm:

@@ -36,21 +36,14 @@ _COINCIDENCE_TIME = 1.0
 
 @dataclass(frozen=True)
 class FinalTracks:
-    """The tracks of a run.
-
-    Attributes
-    ----------
-    trajectory : TRAJECTORY (n,)
-        Sorted by frame, then id.
-    events : EVENT (m,)
-        Sorted by frame.
-    identity : int64 (k,)
-        Identity of each committed row, 0 where its track was dropped.
-    """
+    """The tracks of a run."""
 
     trajectory: Rows
+    """TRAJECTORY (n,): sorted by frame, then id."""
     events: Rows
+    """EVENT (m,): sorted by frame."""
     identity: Ints
+    """int64 (k,): identity of each committed row, 0 where its track was dropped."""
 
 
 def final_tracks(

@@ -18,32 +18,22 @@ _LINK_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class Correspondences:
-    """Points (a person in a frame) that several views observe, and the endpoints of each observation.
-
-    Attributes
-    ----------
-    frame : int64 (n,)
-        Frame of the recording, for each point.
-    ground : float64 (n, 2)
-        Approximate ground point, metres.
-    velocity : float64 (n, 2)
-        Metres per second; 0 where it is not known.
-    person : int64 (n,)
-        Track that the point belongs to.
-    point, view : int64 (m,)
-        Point and view of each observation.
-    foot, head : float64 (m, 2)
-        Pixels.
-    """
+    """Points (a person in a frame) that several views observe, and the endpoints of each observation."""
 
     frame: Ints
+    """int64 (n,): frame of the recording, for each point."""
     ground: Floats
+    """float64 (n, 2): approximate ground point, metres."""
     velocity: Floats
+    """float64 (n, 2): metres per second; 0 where it is not known."""
     person: Ints
+    """int64 (n,): track that the point belongs to."""
     point: Ints
     view: Ints
+    """int64 (m,) each: point and view of each observation."""
     foot: Floats
     head: Floats
+    """float64 (m, 2) each: pixels."""
 
     def of(self, points: Ints) -> Correspondences:
         """A subset of the points, by increasing index, with their observations."""

@@ -30,19 +30,13 @@ _NOISE_AREA = 0.03
 
 @dataclass(frozen=True)
 class Endpoints:
-    """Feet and heads of one view's isolated people, in order of frame.
-
-    Attributes
-    ----------
-    frame : int64 (n,)
-        The stream's own frame.
-    foot, head : float64 (n, 2)
-        Pixels of the real image.
-    """
+    """Feet and heads of one view's isolated people, in order of frame."""
 
     frame: Ints
+    """int64 (n,): the stream's own frame."""
     foot: Floats
     head: Floats
+    """float64 (n, 2) each: pixels of the real image."""
 
     def __len__(self) -> int:
         return len(self.frame)

@@ -33,21 +33,14 @@ _MIN_FEATURES = 25
 
 @dataclass(frozen=True)
 class Marks:
-    """Floor features, each in two views.
-
-    Attributes
-    ----------
-    view : int64 (n, 2)
-        Indices of the two views.
-    pixel : float64 (n, 2, 2)
-        Its pixel in each of them.
-    ground : float64 (n, 2)
-        Approximate ground point, metres.
-    """
+    """Floor features, each in two views."""
 
     view: Ints
+    """int64 (n, 2): indices of the two views."""
     pixel: Floats
+    """float64 (n, 2, 2): its pixel in each of them."""
     ground: Floats
+    """float64 (n, 2): approximate ground point, metres."""
 
     def __len__(self) -> int:
         return len(self.view)

@@ -40,46 +40,30 @@ _STEP_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class CalibrationInput:
-    """Input of the calibration from people.
-
-    Attributes
-    ----------
-    endpoints
-        Endpoints of isolated people, one entry a camera.
-    sizes
-        Width and height of the images, pixels.
-    frame_rate
-        Frames per second of all streams.
-    person_height
-        Mean body height, metres.
-    most_delay
-        Greatest delay of one stream against another, seconds; 0 where all are synchronous.
-    """
+    """Input of the calibration from people."""
 
     endpoints: tuple[Endpoints, ...]
+    """Endpoints of isolated people, one entry a camera."""
     sizes: tuple[tuple[int, int], ...]
+    """Width and height of the images, pixels."""
     frame_rate: float
+    """Frames per second of all streams."""
     person_height: float
+    """Mean body height, metres."""
     most_delay: float
+    """Greatest delay of one stream against another, seconds; 0 where all are synchronous."""
 
 
 @dataclass(frozen=True)
 class SolvedViews:
-    """Cameras on one ground.
-
-    Attributes
-    ----------
-    adjustment
-        Result of the last adjustment.
-    problem
-        Its observations.
-    delay : int64 (view,)
-        A stream's own frame = the recording's frame + delay.
-    """
+    """Cameras on one ground."""
 
     adjustment: Adjustment
+    """Result of the last adjustment."""
     problem: BundleProblem
+    """Its observations."""
     delay: Ints
+    """int64 (view,): a stream's own frame = the recording's frame + delay."""
 
 
 def single_view_cameras(views: CalibrationInput, progress: Callable[[], None]) -> list[Floats]:

@@ -30,41 +30,27 @@ _MAX_ALIGNMENTS = 5
 
 @dataclass(frozen=True)
 class ViewPaths:
-    """Ground paths of one view's people, on a ground of its own.
-
-    Attributes
-    ----------
-    frame : int64 (n,)
-        Frame of the stream.
-    place : complex128 (n,)
-        Ground point x + iy, metres.
-    path : int64 (n,)
-        Path number.
-    """
+    """Ground paths of one view's people, on a ground of its own."""
 
     frame: Ints
+    """int64 (n,): frame of the stream."""
     place: Complexes
+    """complex128 (n,): ground point x + iy, metres."""
     path: Ints
+    """int64 (n,): path number."""
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """Similarity and delay between two views: b(t + delay) = factor a(t) + shift.
-
-    Attributes
-    ----------
-    delay
-        Frames.
-    factor, shift
-        Complex: rotation and scale, and metres.
-    support
-        Number of agreeing people and frames, weighted by closeness.
-    """
+    """Similarity and delay between two views: b(t + delay) = factor a(t) + shift."""
 
     delay: int
+    """Frames."""
     factor: complex
     shift: complex
+    """Complex: rotation and scale, and metres."""
     support: float
+    """Number of agreeing people and frames, weighted by closeness."""
 
     @property
     def inverse(self) -> Alignment:

@@ -19,18 +19,12 @@ Pairs = Mapping[tuple[int, int], Sequence[Alignment]]
 
 @dataclass(frozen=True)
 class MergedViews:
-    """Views on one ground.
-
-    Attributes
-    ----------
-    placed
-        Alignment from the first view to each view, by index; views that fit nowhere are missing.
-    support : float64 (view, view)
-        Support between each two merged views.
-    """
+    """Views on one ground."""
 
     placed: dict[int, Alignment]
+    """Alignment from the first view to each view, by index; views that fit nowhere are missing."""
     support: Floats
+    """float64 (view, view): support between each two merged views."""
 
 
 def align_all(

@@ -34,18 +34,12 @@ _DELAY_MISFIT = 0.75
 
 @dataclass(frozen=True)
 class StreamDelay:
-    """A view with a delayed stream.
-
-    Attributes
-    ----------
-    view
-        Index in the rig.
-    frames
-        Delay in frames; negative where the stream runs early.
-    """
+    """A view with a delayed stream."""
 
     view: int
+    """Index in the rig."""
     frames: int
+    """Delay in frames; negative where the stream runs early."""
 
 
 def match_frames(

@@ -33,23 +33,16 @@ _MARGIN = 0.5
 
 @dataclass(frozen=True)
 class BoxCorrespondences:
-    """People of some frames with the box of each in every view.
-
-    Attributes
-    ----------
-    frame : int64 (n,)
-    ground : float64 (n, 2)
-        Metres.
-    height : float64 (n,)
-        Metres.
-    box : float64 (n, view, 4)
-        left, top, right, bottom in pixels; nan where a view has no box of the person.
-    """
+    """People of some frames with the box of each in every view."""
 
     frame: Ints
+    """int64 (n,)."""
     ground: Floats
+    """float64 (n, 2): metres."""
     height: Floats
+    """float64 (n,): metres."""
     box: Floats
+    """float64 (n, view, 4): left, top, right, bottom in pixels; nan where a view has no box of the person."""
 
     def __len__(self) -> int:
         return len(self.frame)

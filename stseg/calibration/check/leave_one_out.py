@@ -28,18 +28,12 @@ _DIFFERENCE = 0.02
 
 @dataclass(frozen=True)
 class GroundEstimate:
-    """Ground points and heights estimated from some of the views.
-
-    Attributes
-    ----------
-    ground : float64 (n, 2)
-        Metres; nan where too few views see the person.
-    height : float64 (n,)
-        Metres.
-    """
+    """Ground points and heights estimated from some of the views."""
 
     ground: Floats
+    """float64 (n, 2): metres; nan where too few views see the person."""
     height: Floats
+    """float64 (n,): metres."""
 
 
 def locate(people: BoxCorrespondences, tables: Sequence[BodyTable], views: Sequence[int], least: int) -> GroundEstimate:

@@ -33,30 +33,21 @@ _LOST_CONFIRMATION = 0.6
 
 @dataclass(frozen=True)
 class Check:
-    """Result of a rig check.
-
-    Attributes
-    ----------
-    verdict
-        Disagreement of each view with the others.
-    confirmed : tuple of float
-        Share of the people inside each view's image (by the others) that it has a box of; nan where there are few.
-    lost : tuple of int
-        Views that confirm almost no person of the others.
-    swapped
-        Two views with swapped streams.
-    delays
-        Delayed streams; the verdict holds with their delays undone.
-    people
-        Number of people (a person in a frame counts once) that two views or more show.
-    """
+    """Result of a rig check."""
 
     verdict: Verdict
+    """Disagreement of each view with the others."""
     confirmed: tuple[float, ...]
+    """tuple of float: share of the people inside each view's image (by the others) that it has a box of; nan where
+    there are few."""
     lost: tuple[int, ...]
+    """tuple of int: views that confirm almost no person of the others."""
     swapped: tuple[int, int] | None
+    """Two views with swapped streams."""
     delays: tuple[StreamDelay, ...]
+    """Delayed streams; the verdict holds with their delays undone."""
     people: int
+    """Number of people (a person in a frame counts once) that two views or more show."""
 
     @property
     def sound(self) -> bool:

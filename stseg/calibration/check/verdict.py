@@ -34,41 +34,28 @@ _SUSPECTS = 3
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Disagreement of one view with the others.
-
-    Attributes
-    ----------
-    view
-        Index in the rig.
-    others
-        Number of views it was compared with.
-    people
-        Number of people compared (a person in a frame counts once).
-    confirmed
-        Share of the people inside its image that it shows.
-    feet, heads
-        Root mean square of the smoothed disagreement across the viewing ray at feet and heads, metres.
-    right, down
-        Its mean at the feet: the view's people against the others', metres.
-    scatter
-        Robust standard deviation around the smoothed disagreement, metres.
-    ground
-        Root mean square distance of the feet on the ground, metres.
-    pixels
-        The same in the view's image.
-    """
+    """Disagreement of one view with the others."""
 
     view: int
+    """Index in the rig."""
     others: int
+    """Number of views it was compared with."""
     people: int
+    """Number of people compared (a person in a frame counts once)."""
     confirmed: float
+    """Share of the people inside its image that it shows."""
     feet: float
     heads: float
+    """Root mean square of the smoothed disagreement across the viewing ray at feet and heads, metres."""
     right: float
     down: float
+    """Its mean at the feet: the view's people against the others', metres."""
     scatter: float
+    """Robust standard deviation around the smoothed disagreement, metres."""
     ground: float
+    """Root mean square distance of the feet on the ground, metres."""
     pixels: float
+    """The same in the view's image."""
 
     @property
     def off(self) -> float:
@@ -81,28 +68,21 @@ class Disagreement:
 
 @dataclass(frozen=True)
 class _RawDisagreement:
-    """Disagreement of one view before the common component is removed.
-
-    Attributes
-    ----------
-    planes
-        Smoothed over the ground.
-    field : float64 (n, 3)
-        The same of each person: middle to the right, head and feet downwards, metres across the viewing ray.
-    scale : float64 (n,)
-        Pixels a metre at each person.
-    slope : float64 (n, 2, 2)
-        Ground metres a pixel at each person's feet.
-    """
+    """Disagreement of one view before the common component is removed."""
 
     view: int
     others: int
     confirmed: float
     planes: _Planes
+    """Smoothed over the ground."""
     field: Floats
+    """float64 (n, 3): the same of each person: middle to the right, head and feet downwards, metres across the viewing
+    ray."""
     scatter: float
     scale: Floats
+    """float64 (n,): pixels a metre at each person."""
     slope: Floats
+    """float64 (n, 2, 2): ground metres a pixel at each person's feet."""
 
     @property
     def mean(self) -> Floats:
@@ -153,18 +133,12 @@ def _raw_disagreement(
 
 @dataclass(frozen=True)
 class _Planes:
-    """Planes over the ground, one for each of several columns.
-
-    Attributes
-    ----------
-    middle : float64 (2,)
-        Metres.
-    found : float64 (3, column)
-        Value at `middle`, slope along x, slope along y.
-    """
+    """Planes over the ground, one for each of several columns."""
 
     middle: Floats
+    """float64 (2,): metres."""
     found: Floats
+    """float64 (3, column): value at `middle`, slope along x, slope along y."""
 
     def at(self, ground: Floats) -> Floats:
         """Values at places (n, 2), float64 (n, column)."""
@@ -196,21 +170,14 @@ def _size(moves: Floats) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Displaced views of a rig.
-
-    Attributes
-    ----------
-    views
-        Disagreement of each view, in the rig's order; None where people are too few.
-    named
-        Displaced views, the worst first.
-    unresolved
-        Two views that disagree where there is no third to decide.
-    """
+    """Displaced views of a rig."""
 
     views: tuple[Disagreement | None, ...]
+    """Disagreement of each view, in the rig's order; None where people are too few."""
     named: tuple[Disagreement, ...]
+    """Displaced views, the worst first."""
     unresolved: tuple[Disagreement, Disagreement] | None
+    """Two views that disagree where there is no third to decide."""
 
 
 def judge(rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences) -> Verdict:

@@ -20,27 +20,18 @@ _REFINE = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
 
 @dataclass(frozen=True)
 class LensFit:
-    """A calibrated lens.
-
-    Attributes
-    ----------
-    matrix : float64 (3, 3)
-        Camera matrix.
-    distortion : float64 (5,)
-        k1, k2, p1, p2, k3.
-    error
-        Root mean square of the reprojection errors, pixels.
-    focal_deviation
-        Standard deviation of the focal length, pixels.
-    views
-        Number of views of the board.
-    """
+    """A calibrated lens."""
 
     matrix: Floats
+    """float64 (3, 3): camera matrix."""
     distortion: Floats
+    """float64 (5,): k1, k2, p1, p2, k3."""
     error: float
+    """Root mean square of the reprojection errors, pixels."""
     focal_deviation: float
+    """Standard deviation of the focal length, pixels."""
     views: int
+    """Number of views of the board."""
 
 
 def find_corners(image: Bytes, board: tuple[int, int]) -> Floats | None:

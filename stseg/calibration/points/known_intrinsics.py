@@ -19,24 +19,16 @@ from stseg.geometry.fits import focal_of_square_pixels, middle_matrix
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A camera pose with its uncertainty.
-
-    Attributes
-    ----------
-    parameters : float64 (12,)
-        Homography row by row, then the vertical.
-    slope : float64 (12, k)
-        Their Jacobian in the k unknowns.
-    normal : float64 (k, k)
-        J'J of the reprojection errors in the unknowns, 1 / square pixels.
-    noise
-        Squared error per degree of freedom, square pixels.
-    """
+    """A camera pose with its uncertainty."""
 
     parameters: Floats
+    """float64 (12,): homography row by row, then the vertical."""
     slope: Floats
+    """float64 (12, k): their Jacobian in the k unknowns."""
     normal: Floats
+    """float64 (k, k): J'J of the reprojection errors in the unknowns, 1 / square pixels."""
     noise: float
+    """Squared error per degree of freedom, square pixels."""
 
     @property
     def unknowns(self) -> int:

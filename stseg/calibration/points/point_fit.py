@@ -46,20 +46,14 @@ _MIN_POINTS = 5
 
 @dataclass(frozen=True)
 class Points:
-    """Measured points and their pixels in one camera.
-
-    Attributes
-    ----------
-    pixel : float64 (n, 2)
-    ground : float64 (n, 2)
-        Metres.
-    height : float64 (n,)
-        Metres above the ground.
-    """
+    """Measured points and their pixels in one camera."""
 
     pixel: Floats
+    """float64 (n, 2)."""
     ground: Floats
+    """float64 (n, 2): metres."""
     height: Floats
+    """float64 (n,): metres above the ground."""
 
     @property
     def low(self) -> Flags:
@@ -69,34 +63,24 @@ class Points:
 
 @dataclass(frozen=True)
 class PointFit:
-    """A fitted camera with its residuals and uncertainty.
-
-    Attributes
-    ----------
-    camera
-    points
-        Input of the fit.
-    vertical_from
-        "lens" (its camera matrix) or "square pixels" (centred principal point) where the points agree with it or too
-        few are above the ground; else "points" above the ground.
-    off_pixel : float64 (n,)
-        Reprojection error of each point, pixels.
-    off_ground : float64 (n,)
-        The same in the plane at the point's height, metres; nan above the horizon.
-    out : bool (n,)
-        Outliers.
-    parameters : float64 (k,), covariance : float64 (k, k)
-        The homography row by row, then the vertical where points determine it; up to scale.
-    """
+    """A fitted camera with its residuals and uncertainty."""
 
     camera: Camera
     points: Points
+    """Input of the fit."""
     vertical_from: VerticalFrom
+    """Source: "lens" (its camera matrix) or "square pixels" (centred principal point) where the points agree with it
+    or too few are above the ground; else "points" above the ground."""
     off_pixel: Floats
+    """float64 (n,): reprojection error of each point, pixels."""
     off_ground: Floats
+    """float64 (n,): the same in the plane at the point's height, metres; nan above the horizon."""
     out: Flags
+    """bool (n,): outliers."""
     parameters: Floats
     covariance: Floats
+    """`parameters`: float64 (k,); `covariance`: float64 (k, k): the homography row by row, then the vertical where
+    points determine it; up to scale."""
 
     def ground_deviation(self, grid: Grid) -> Floats:
         """Uncertainty of each ground cell, propagated from the fit's covariance.

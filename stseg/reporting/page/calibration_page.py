@@ -20,17 +20,12 @@ _PLAN_SIZE = 900
 
 @dataclass(frozen=True)
 class FloorPlan:
-    """A picture of the ground from above, y up.
-
-    Attributes
-    ----------
-    image : uint8 (v, u, 3)
-    scale
-        Pixels a metre.
-    """
+    """A picture of the ground from above, y up."""
 
     image: Bytes
+    """uint8 (v, u, 3)."""
     scale: float
+    """Pixels a metre."""
 
 
 def calibration_page(

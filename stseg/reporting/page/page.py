@@ -19,95 +19,67 @@ from stseg.reporting.run_statistics import DOUBT_LIMIT, BusyTime, Span, doubtful
 
 @dataclass(frozen=True)
 class ViewSummary:
-    """Summary of one view.
-
-    Attributes
-    ----------
-    name
-    ground
-        Share of the ground in its view, 0..1.
-    denied
-        Number of ghosts that it has evidence against.
-    nats
-        Median evidence for people in its view, nats; nan without people.
-    """
+    """Summary of one view."""
 
     name: str
     ground: float
+    """Share of the ground in its view, 0..1."""
     denied: int
+    """Number of ghosts that it has evidence against."""
     nats: float
+    """Median evidence for people in its view, nats; nan without people."""
 
 
 @dataclass(frozen=True)
 class Contents:
-    """Contents of the page.
-
-    Attributes
-    ----------
-    title
-    facts
-        Names and values, at the top.
-    answers
-        Questions and answers (HTML), below.
-    warnings
-        Warnings.
-    span
-        The frames of the run.
-    trajectory : TRAJECTORY (n,)
-    tracks : TRACK (m,)
-    events : EVENT (k,)
-    candidates
-        Number of candidates.
-    ghosts
-        Rejected candidates.
-    truth : (t,) with frame, or None
-    kept
-        Kept part of the volume: all, tracks or none.
-    data
-        JSON for the script, see `embedded`.
-    plan, thread, dwell_places, ghost_map, blind_map
-        Figures; the thread is shown where no script runs.
-    view_summaries
-        A row for each view.
-    stages
-        Seconds by stage.
-    slices, cameras
-        Figures of these sections; a section without figures is left out.
-    has_images
-        Whether the cameras' figures show camera images, of which the page warns.
-    names
-        Names of tracks by id.
-    busy, hours
-        Plans of the busiest minutes, and people by the hour; empty of a short run.
-    """
+    """Contents of the page."""
 
     title: str
     facts: Sequence[tuple[str, str]]
+    """Names and values, at the top."""
     answers: Sequence[tuple[str, str]]
+    """Questions and answers (HTML), below."""
     warnings: Sequence[str]
     span: Span
+    """The frames of the run."""
     trajectory: Rows
+    """TRAJECTORY (n,)."""
     tracks: Rows
+    """TRACK (m,)."""
     events: Rows
+    """EVENT (k,)."""
     candidates: int
+    """Number of candidates."""
     ghosts: GhostReasons
+    """Rejected candidates."""
     truth: Rows | None
+    """(t,) with frame, or None."""
     kept: str
+    """Kept part of the volume: all, tracks or none."""
     data: str
+    """JSON for the script, see `embedded`."""
     plan: Figure
     thread: Figure
     dwell_places: Sequence[Figure]
     ghost_map: Figure
     blind_map: Figure
+    """Figures; the thread is shown where no script runs."""
     view_summaries: Sequence[ViewSummary]
+    """A row for each view."""
     stages: Sequence[tuple[str, float]]
+    """Seconds by stage."""
     slices: Sequence[Figure]
-    cell_probability: Sequence[tuple[float, float]]
     cameras: Sequence[Figure]
+    """Figures of these sections; a section without figures is left out."""
+    cell_probability: Sequence[tuple[float, float]]
+    """Log-odds, nats, and the share of cells of these that people fill; empty where no volume was kept."""
     has_images: bool
+    """Whether the cameras' figures show camera images, of which the page warns."""
     names: Mapping[int, str]
+    """Names of tracks by id."""
     busy: Sequence[Figure]
     hours: Sequence[BusyTime]
+    """Plans of the busiest minutes, and people by the hour; empty of a short run."""
 
     @property
     def still(self) -> list[Figure]:

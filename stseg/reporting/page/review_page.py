@@ -23,21 +23,14 @@ _VIEWS = 2
 
 @dataclass(frozen=True)
 class Question:
-    """A question with its answers.
-
-    Attributes
-    ----------
-    text
-        The question, one line.
-    choices
-        Key, words and line of the answers file of each answer.
-    pictures
-        Caption and picture of each moment and view.
-    """
+    """A question with its answers."""
 
     text: str
+    """The question, one line."""
     choices: Sequence[tuple[str, str, str]]
+    """Key, words and line of the answers file of each answer."""
     pictures: Sequence[tuple[str, Bytes]]
+    """Caption and picture of each moment and view."""
 
 
 def review_page(title: str, questions: Sequence[Question], shows_images: bool) -> str:

@@ -22,19 +22,13 @@ _WARM_TONES = np.array([(252, 251, 250), (150, 206, 254), (60, 140, 240), (38, 5
 
 @dataclass(frozen=True)
 class Bins:
-    """Square bins of the ground.
-
-    Attributes
-    ----------
-    x, y
-        The ground rectangle, metres.
-    side
-        Of a bin, metres.
-    """
+    """Square bins of the ground."""
 
     x: tuple[float, float]
     y: tuple[float, float]
+    """The ground rectangle, metres."""
     side: float
+    """Of a bin, metres."""
 
     @classmethod
     def of(cls, grid: Grid) -> Bins:

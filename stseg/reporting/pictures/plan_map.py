@@ -18,25 +18,17 @@ _ROUND_DISTANCES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0
 
 @dataclass(frozen=True)
 class PlanMap:
-    """Metres on the ground to pixels of a plan view; y points up.
-
-    Attributes
-    ----------
-    x, y
-        What is shown, metres.
-    scale
-        Pixels a metre.
-    corner
-        Pixel of the upper left corner (least x, greatest y).
-    size
-        Width and height of the canvas, pixels.
-    """
+    """Metres on the ground to pixels of a plan view; y points up."""
 
     x: tuple[float, float]
     y: tuple[float, float]
+    """What is shown, metres."""
     scale: float
+    """Pixels a metre."""
     corner: tuple[float, float]
+    """Pixel of the upper left corner (least x, greatest y)."""
     size: tuple[int, int]
+    """Width and height of the canvas, pixels."""
 
     @classmethod
     def fit(cls, grid: Grid, places: AnyArray, width: int, height: int) -> PlanMap:

@@ -27,24 +27,16 @@ _HALF_RANGE = 63  # grey levels on either side of no evidence
 
 @dataclass(frozen=True)
 class Sheets:
-    """Thin slices of a run.
-
-    Attributes
-    ----------
-    frames : int64 (n,)
-        Frames of the sheets.
-    shape
-        (plane, y, x) of a sheet; several cells of a large ground are one, the greatest.
-    limit
-        Log-odds of the greatest grey, nats.
-    pngs
-        A sheet for each frame.
-    """
+    """Thin slices of a run."""
 
     frames: Ints
+    """int64 (n,): frames of the sheets."""
     shape: tuple[int, int, int]
+    """(plane, y, x) of a sheet; several cells of a large ground are one, the greatest."""
     limit: float
+    """Log-odds of the greatest grey, nats."""
     pngs: list[bytes]
+    """A sheet for each frame."""
 
 
 def thin_sheets(frames: Ints, grid: Grid, read_frame: ReadFrame, budget: int, wanted: Ints) -> Sheets:

@@ -58,25 +58,17 @@ def spacetime_picture(
 
 @dataclass(frozen=True)
 class Block:
-    """A parallel projection of the ground (metres) and time (frames).
-
-    Attributes
-    ----------
-    x, y
-        The ground rectangle, metres.
-    time
-        First and last frame.
-    matrix : float64 (3, 3)
-        x, y, frame to u, v and the distance from the eye.
-    origin : float64 (2,)
-        Pixel of x = 0, y = 0, frame 0.
-    """
+    """A parallel projection of the ground (metres) and time (frames)."""
 
     x: tuple[float, float]
     y: tuple[float, float]
+    """The ground rectangle, metres."""
     time: tuple[int, int]
+    """First and last frame."""
     matrix: Floats
+    """float64 (3, 3): x, y, frame to u, v and the distance from the eye."""
     origin: Floats
+    """float64 (2,): pixel of x = 0, y = 0, frame 0."""
 
     @classmethod
     def fit(cls, grid: Grid, first: int, last: int, size: tuple[int, int]) -> Block:

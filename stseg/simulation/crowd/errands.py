@@ -18,37 +18,25 @@ _MEETING_DISTANCE = 0.7  # metres between two people in a meeting
 
 @dataclass(slots=True)
 class Errand:
-    """Goal and schedule of one pedestrian.
-
-    Attributes
-    ----------
-    goal : float64 (2,)
-        Goal position, metres.
-    stay
-        Seconds until the pedestrian leaves.
-    enters, leaves
-        Whether the pedestrian is entering or leaving.
-    pause
-        Seconds to stand at the goal.
-    waits
-        Whether the pedestrian is standing at the goal.
-    spent
-        Seconds since the goal was set.
-    partner : float64 (2,) or None
-        Goal of the person to meet.
-    half : float64 (2,)
-        Half the area's sides, metres.
-    """
+    """Goal and schedule of one pedestrian."""
 
     goal: Floats
+    """float64 (2,): goal position, metres."""
     stay: float
+    """Seconds until the pedestrian leaves."""
     half: Floats
+    """float64 (2,): half the area's sides, metres."""
     enters: bool = False
     leaves: bool = False
+    """Whether the pedestrian is entering or leaving."""
     pause: float = 0.0
+    """Seconds to stand at the goal."""
     waits: bool = False
+    """Whether the pedestrian is standing at the goal."""
     spent: float = 0.0
+    """Seconds since the goal was set."""
     partner: Floats | None = field(default=None)
+    """float64 (2,) or None: goal of the person to meet."""
 
     @property
     def stays_inside(self) -> bool:

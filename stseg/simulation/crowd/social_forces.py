@@ -33,32 +33,22 @@ _STRIDE, _STRIDE_RISE = 0.35, 0.41  # of the body's height, for two steps: at re
 
 @dataclass(frozen=True, slots=True)
 class CrowdFrame:
-    """All pedestrians of a frame, also those just outside the area.
-
-    Attributes
-    ----------
-    frame
-        Frame number.
-    id : int64 (n,)
-        From 1; each id enters once, unless the scene's people come back.
-    ground : float64 (n, 2)
-        Body axes, metres.
-    heading, phase : float64 (n,)
-        Direction of the chest, and phase of the gait cycle, radians.
-    swing : float64 (n,)
-        Amplitude of the limbs, 0 at rest, 1 at full pace.
-    height, build : float64 (n,)
-        Metres, and relative width of the body.
-    """
+    """All pedestrians of a frame, also those just outside the area."""
 
     frame: int
+    """Frame number."""
     id: Ints
+    """int64 (n,): from 1; each id enters once, unless the scene's people come back."""
     ground: Floats
+    """float64 (n, 2): body axes, metres."""
     heading: Floats
     phase: Floats
+    """float64 (n,) each: direction of the chest, and phase of the gait cycle, radians."""
     swing: Floats
+    """float64 (n,): amplitude of the limbs, 0 at rest, 1 at full pace."""
     height: Floats
     build: Floats
+    """float64 (n,) each: metres, and relative width of the body."""
 
     def truth(self, area: tuple[float, float]) -> Rows:
         """TRUTH rows of the pedestrians inside the area, sorted by id."""

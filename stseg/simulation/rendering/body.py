@@ -22,25 +22,16 @@ _KNEE, _ELBOW = 0.85, 0.35  # radians of bend at full pace, in the leg that swin
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One ellipsoid.
-
-    Attributes
-    ----------
-    name
-        Name of the body part.
-    ends
-        The two joints that it lies along.
-    aside, ahead
-        Half width and half depth, shares of the height.
-    stretch
-        Half length over half the joints' distance: neighbours overlap, so that no gap shows.
-    """
+    """One ellipsoid."""
 
     name: str
     ends: tuple[str, str]
+    """The two joints that it lies along."""
     sideways: float
     ahead: float
+    """Half width and half depth, shares of the height."""
     stretch: float = 1.2
+    """Half length over half the joints' distance: neighbours overlap, so that no gap shows."""
 
 
 _SIDES = ("left", "right")
@@ -60,21 +51,14 @@ PARTS = (
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """Ellipsoids of all bodies: the points X with |form (X - centre)| <= 1.
-
-    Attributes
-    ----------
-    centre : float64 (n, part, 3)
-        Metres.
-    form : float64 (n, part, 3, 3)
-        Rows point ahead, aside and along the part, divided by the half axes, 1/metre.
-    axes : float64 (n, part, 3, 3)
-        Rows are the half axes themselves, metres.
-    """
+    """Ellipsoids of all bodies: the points X with |form (X - centre)| <= 1."""
 
     centre: Floats
+    """float64 (n, part, 3): metres."""
     form: Floats
+    """float64 (n, part, 3, 3): rows point ahead, aside and along the part, divided by the half axes, 1/metre."""
     axes: Floats
+    """float64 (n, part, 3, 3): rows are the half axes themselves, metres."""
 
     def corners(self, scale: float) -> Floats:
         """Corners of the boxes around the ellipsoids, scaled, float64 (n, part, 8, 3), metres."""

@@ -27,21 +27,14 @@ LAMP = np.array([0.5, -0.35, 1.0]) / np.linalg.norm([0.5, -0.35, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class RenderedView:
-    """One camera's rendered frame with its ground truth.
-
-    Attributes
-    ----------
-    image : uint8 (v, u, 3)
-        Blue, green, red; black where the scene has no video.
-    instances : uint16 (v, u)
-        Id of the person that each pixel shows, 0 for background; also people just outside the area.
-    boxes
-        Boxes of the simulated detector.
-    """
+    """One camera's rendered frame with its ground truth."""
 
     image: Bytes
+    """uint8 (v, u, 3): blue, green, red; black where the scene has no video."""
     instances: NDArray[np.uint16]
+    """uint16 (v, u): id of the person that each pixel shows, 0 for background; also people just outside the area."""
     boxes: Boxes
+    """Boxes of the simulated detector."""
 
     @property
     def mask(self) -> Bytes:
@@ -51,24 +44,16 @@ class RenderedView:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """The rendered scene before the sensor model.
-
-    Attributes
-    ----------
-    light : uint8 (v, u, 3)
-        The scene at normal light: no softness, no noise.
-    instances : uint16 (v, u)
-        As in `RenderedView`.
-    silhouettes : int64 (n, 5)
-        See `stseg.simulation.rendering.ray_casting.draw_bodies`.
-    depth : float32 (v, u)
-        Depth in lengths of the pixels' rays, metres.
-    """
+    """The rendered scene before the sensor model."""
 
     light: Bytes
+    """uint8 (v, u, 3): the scene at normal light: no softness, no noise."""
     instances: NDArray[np.uint16]
+    """uint16 (v, u): as in `RenderedView`."""
     silhouettes: Ints
+    """int64 (n, 5): see `stseg.simulation.rendering.ray_casting.draw_bodies`."""
     depth: Singles
+    """float32 (v, u): depth in lengths of the pixels' rays, metres."""
 
 
 class Viewer:

@@ -21,21 +21,14 @@ _LATTICE = 64
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """A camera's view of the empty room.
-
-    Attributes
-    ----------
-    image : uint8 (v, u, 3)
-        Blue, green, red.
-    ground : float32 (v, u, 2)
-        Ground point of each pixel, metres; nan on the walls.
-    depth : float32 (v, u)
-        Depth in lengths of the pixels' rays, metres.
-    """
+    """A camera's view of the empty room."""
 
     image: Bytes
+    """uint8 (v, u, 3): blue, green, red."""
     ground: Singles
+    """float32 (v, u, 2): ground point of each pixel, metres; nan on the walls."""
     depth: Singles
+    """float32 (v, u): depth in lengths of the pixels' rays, metres."""
 
 
 def render_room(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:

@@ -34,23 +34,16 @@ _OBJECT_HEIGHT = 3.0
 
 @dataclass(frozen=True)
 class Moment:
-    """One camera's frame.
-
-    Attributes
-    ----------
-    seed, camera, frame
-        Of the scene; number of the camera and of the frame.
-    frame_rate
-        Frames per second.
-    body_width
-        Width of a common body in the middle of the area, pixels.
-    """
+    """One camera's frame."""
 
     seed: int
     camera: int
     frame: int
+    """Of the scene; number of the camera and of the frame."""
     frame_rate: float
+    """Frames per second."""
     body_width: float
+    """Width of a common body in the middle of the area, pixels."""
 
     def stream(self, kind: str) -> np.random.Generator:
         """Randomness of one kind of error in this frame."""
