@@ -6,6 +6,6 @@ from stseg.simulation.named_scenes import NAMED
 from stseg.simulation.rendering.illumination import Lamp
 from stseg.simulation.rendering.render import RenderedView
 from stseg.simulation.scene import SceneSpec
-from stseg.simulation.spoiling.spoil import Spoil, SpoiledFilm
+from stseg.simulation.spoiling.spoil import Spoil
 
-__all__ = ["NAMED", "Lamp", "RenderedFrame", "RenderedView", "Route", "SceneFilm", "SceneSpec", "Spoil", "SpoiledFilm"]
+__all__ = ["NAMED", "Lamp", "RenderedFrame", "RenderedView", "Route", "SceneFilm", "SceneSpec", "Spoil"]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from stseg.arrays import Bytes, Rows
 from stseg.geometry import Rig
@@ -13,6 +15,8 @@ from stseg.simulation.rendering.body import pose, upright_cylinders
 from stseg.simulation.rendering.cameras import build_rig, turns
 from stseg.simulation.rendering.render import RenderedView, Viewer
 from stseg.simulation.scene import Kind, SceneSpec
+from stseg.simulation.spoiling.errors import Moment
+from stseg.simulation.spoiling.spoil import Spoil, body_width, spoiled_boxes, spoiled_mask
 
 EMPTY_FRAMES = 40
 """Length of the films of the empty room; they end just before the first frame."""
@@ -37,6 +41,8 @@ class SceneFilm:
     ----------
     spec
         The scene.
+    spoils
+        Errors of masks and boxes, one after the other.
 
     Attributes
     ----------
@@ -44,8 +50,8 @@ class SceneFilm:
         Its cameras and grid.
     """
 
-    def __init__(self, spec: SceneSpec) -> None:
-        self.spec = spec
+    def __init__(self, spec: SceneSpec, spoils: Sequence[Spoil] = ()) -> None:
+        self.spec, self.spoils = spec, tuple(spoils)
         self.rig: Rig = build_rig(spec)
         self.viewers = [Viewer(spec, *place) for place in zip(self.rig.cameras, turns(spec), strict=True)]
 
@@ -75,4 +81,15 @@ class SceneFilm:
             wide, length = self.spec.cylinder, self.spec.length or self.spec.cylinder
             bodies = upright_cylinders(crowd, wide, length) if wide else pose(crowd)
             views = tuple(viewer.view(crowd, bodies) for viewer in self.viewers)
-            yield RenderedFrame(crowd.frame, crowd.truth(self.spec.area), views)
+            spoiled = self._spoiled(crowd.frame, views) if self.spoils else views
+            yield RenderedFrame(crowd.frame, crowd.truth(self.spec.area), spoiled)
+
+    def _spoiled(self, frame: int, views: Sequence[RenderedView]) -> tuple[RenderedView, ...]:
+        """Views with errors in their masks and boxes."""
+        centre, found = np.array([[np.mean(self.rig.grid.x), np.mean(self.rig.grid.y)]]), []
+        for k, (camera, view) in enumerate(zip(self.rig.cameras, views, strict=True)):
+            moment = Moment(self.spec.seed, k, frame, self.spec.frame_rate, body_width(camera, centre))
+            boxes = spoiled_boxes(view.boxes, self.spoils, moment)
+            mask = spoiled_mask(view.mask, view.instances, self.spoils, moment)
+            found.append(replace(view, boxes=boxes, spoiled=mask))
+        return tuple(found)

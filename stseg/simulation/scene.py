@@ -1,10 +1,13 @@
-"""Specification of a simulated scene in physical quantities."""
+"""Specification of a simulated scene in physical quantities, and its random streams."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Literal
+
+import numpy as np
 
 from stseg.errors import ConfigError
 from stseg.simulation.crowd.routes import Route
@@ -149,3 +152,23 @@ class SceneSpec:
         """Illumination gain at a frame, 1 on average; `phase` is a camera's share of the period, 0..1."""
         turns = frame / self.frame_rate / self.light_period + phase
         return 1.0 + self.light_drift * math.sin(2 * math.pi * turns)
+
+
+class Topic(IntEnum):
+    """Topic of a random stream."""
+
+    CAMERA = 1
+    LIGHT = 2
+    ROOM = 3
+    CROWD = 4
+    PERSON = 5
+    CLOTHES = 6
+    SENSOR = 7
+    DETECTOR = 8
+    SPOIL = 9
+    ARRIVALS = 10
+
+
+def random_stream(seed: int, topic: Topic, *which: int) -> np.random.Generator:
+    """Generator of one topic and item (a camera, a person, a camera's frame), equal wherever it is made."""
+    return np.random.default_rng([seed, int(topic), *which])

@@ -14,7 +14,7 @@ from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import abbreviated
-from stseg.simulation import NAMED, SceneFilm, SceneSpec, Spoil, SpoiledFilm
+from stseg.simulation import NAMED, SceneFilm, SceneSpec, Spoil
 from stseg.simulation.spoiling.spoil import STRENGTHS
 
 _BOUNDS = {"seconds": (0.0, 86_400.0), "frame_rate": limits.FRAME_RATE}
@@ -80,11 +80,11 @@ def simulate(
             raise ConfigError("command line", option, repr(value), f"a number from {low:g} to {high:g}")
     given = {key: value for key, value in changes.items() if value is not None}
     errors, folder = [_spoil(text) for text in spoil], Path(folder)
-    film = SceneFilm(replace(_named(scene), **given))
+    film = SceneFilm(replace(_named(scene), **given), errors)
     with reporter_of(progress).progress("filming", film.frames) as advance:
         write_scene(
             folder,
-            SpoiledFilm(film, errors) if errors else film,
+            film,
             body=_body(film.spec),
             instances=instances,
             overwrite=overwrite,

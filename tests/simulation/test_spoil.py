@@ -14,7 +14,7 @@ from stseg.arrays import Boxes, Bytes
 from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
-from stseg.simulation import NAMED, SceneFilm, Spoil, SpoiledFilm
+from stseg.simulation import NAMED, SceneFilm, Spoil
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 from stseg.simulation.spoiling.spoil import MAX_STRENGTHS, STRENGTHS, spoiled_boxes, spoiled_mask
 
@@ -77,7 +77,7 @@ def test_boxes_jitter_go_missing_and_double() -> None:
 
 def test_a_spoiled_film_keeps_all_but_masks_and_boxes() -> None:
     film = SceneFilm(replace(NAMED["tiny"], seconds=0.2))
-    other = SpoiledFilm(film, [Spoil("dilation", 0.3), Spoil("missed", 1.0)])
+    other = SceneFilm(film.spec, [Spoil("dilation", 0.3), Spoil("missed", 1.0)])
     for plain, wide in zip(film.frame_sets(), other.frame_sets(), strict=True):
         np.testing.assert_array_equal(plain.truth, wide.truth)
         for a, b in zip(plain.views, wide.views, strict=True):
@@ -104,7 +104,7 @@ CORNER = {"dilation": 4.0, "holes": 4.0, "rain": 4.0}
 @pytest.mark.parametrize("kind", CORNER)
 def test_a_small_crowd_is_tracked_through_middle_errors(kind: str) -> None:
     spec = replace(NAMED["demo"], people=3, seconds=1.5)
-    film = SpoiledFilm(SceneFilm(spec), [Spoil(kind, STRENGTHS[kind][1])])
+    film = SceneFilm(spec, [Spoil(kind, STRENGTHS[kind][1])])
     tracker, results, truth = Tracker(film.rig), [], []
     for frame_set in film.frame_sets():
         truth.append(frame_set.truth)

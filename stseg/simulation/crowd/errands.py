@@ -1,12 +1,14 @@
-"""Goals of simulated pedestrians: walk to a place, stand there, meet another person, leave."""
+"""Arrivals and goals of simulated pedestrians: come, walk to a place, stand there, meet another person, leave."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from stseg.arrays import Floats
+from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
 MARGIN = 0.9
 """Distance outside the area at which pedestrians appear and disappear, metres."""
@@ -35,7 +37,7 @@ class Errand:
     """Whether the pedestrian is standing at the goal."""
     spent: float = 0.0
     """Seconds since the goal was set."""
-    partner: Floats | None = field(default=None)
+    partner: Floats | None = None
     """float64 (2,) or None: goal of the person to meet."""
 
     @property
@@ -155,3 +157,45 @@ class Planner:
             return np.asarray(places[0])
         clearance = np.linalg.norm(places[:, None] - others[None], axis=2).min(axis=1)
         return np.asarray(places[int(np.argmax(clearance))])
+
+
+class Arrivals:
+    """The people who come into a scene, by their numbers from 1: a new person replaces each one that leaves."""
+
+    def __init__(self, spec: SceneSpec) -> None:
+        self._spec, self._number = spec, 0
+
+    def next(self, inside: int, /) -> int:
+        """Number of the next person to arrive now, 0 for none; `inside` people are present or about to be."""
+        if inside >= self._spec.people:
+            return 0
+        self._number += 1
+        return self._number
+
+    def advance(self, step: float, present: Iterable[int]) -> None:
+        """Let some seconds pass; `present` are in the scene. Replacements arrive at once."""
+
+
+class Regulars(Arrivals):
+    """The same people come again and again."""
+
+    def __init__(self, spec: SceneSpec) -> None:
+        super().__init__(spec)
+        self._rng = random_stream(spec.seed, Topic.ARRIVALS)
+        self._people = range(1, spec.people + 1)
+        self._away = {person: spec.absence * self._rng.uniform(0.0, 1.6) for person in self._people}
+
+    def next(self, _inside: int, /) -> int:
+        """The first number of those with an absence that is over."""
+        due = min((person for person, left in self._away.items() if left <= 0), default=0)
+        self._away.pop(due, None)
+        return due
+
+    def advance(self, step: float, present: Iterable[int]) -> None:
+        """Absences go by, and begin for those who have left."""
+        here = set(present)
+        for person in self._people:
+            if person in self._away:
+                self._away[person] -= step
+            elif person not in here:
+                self._away[person] = self._spec.absence * self._rng.uniform(0.4, 1.6)

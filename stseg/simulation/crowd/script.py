@@ -9,8 +9,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.simulation.crowd.routes import Route
 from stseg.simulation.crowd.social_forces import CrowdFrame, stride
-from stseg.simulation.random_streams import Topic, random_stream
-from stseg.simulation.scene import SceneSpec
+from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
 _DIFFERENCE = 0.05
 """Half interval of the finite differences of velocity, seconds."""

@@ -13,10 +13,8 @@ from typing import overload
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
-from stseg.simulation.crowd.arrivals import Arrivals, Regulars, Replacements
-from stseg.simulation.crowd.errands import Errand, Planner
-from stseg.simulation.random_streams import Topic, random_stream
-from stseg.simulation.scene import SceneSpec
+from stseg.simulation.crowd.errands import Arrivals, Errand, Planner, Regulars
+from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
 TRUTH = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("height", "<f8")])
 """One row per person inside the area and frame; metres."""
@@ -78,7 +76,7 @@ class Pedestrian:
 def walk_freely(spec: SceneSpec) -> Iterator[CrowdFrame]:
     """Simulate the crowd of a scene, frame by frame."""
     planner = Planner(spec.area, spec.stay, random_stream(spec.seed, Topic.CROWD))
-    arrivals: Arrivals = Regulars(spec) if spec.absence else Replacements(spec)
+    arrivals = Regulars(spec) if spec.absence else Arrivals(spec)
     pedestrians: list[Pedestrian] = []
     steps = int(np.ceil(1 / spec.frame_rate / _TIME_STEP))
     step = 1 / spec.frame_rate / steps

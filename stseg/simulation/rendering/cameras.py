@@ -6,8 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Singles
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.simulation.random_streams import Topic, random_stream
-from stseg.simulation.scene import SceneSpec
+from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
 _AIM = 0.6
 """Height of the point above the area's centre that the cameras look at, metres."""
@@ -78,9 +77,5 @@ def pixel_rays(camera: Camera) -> Singles:
     ideal: Floats = pixel if camera.lens is None else camera.lens.undistort(pixel)
     toward = np.linalg.inv(camera.projection[:, :3])
     rays = np.concatenate([ideal, np.ones_like(ideal[..., :1])], -1) @ toward.T
-    return np.asarray(np.nan_to_num(rays * _depth(camera)), np.float32)
-
-
-def _depth(camera: Camera) -> float:
-    """Scale that makes the third coordinate of P (X, 1) a depth in metres."""
-    return float(np.linalg.norm(camera.projection[2, :3]))
+    # Times the scale that makes the third coordinate of P (X, 1) a depth in metres.
+    return np.asarray(np.nan_to_num(rays * float(np.linalg.norm(camera.projection[2, :3]))), np.float32)

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.rendering.body import PARTS
+from stseg.simulation.scene import Topic, random_stream
 
 PAINT = 10
 """Numbers a part: two colours (blue, green, red, 0..255), then the pattern's steps ahead, aside and along the part,

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
 from stseg.geometry import Camera
 from stseg.simulation.crowd.social_forces import CrowdFrame
-from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.rendering.body import Bodies
 from stseg.simulation.rendering.cameras import frame_seed, light_phase, pixel_rays
 from stseg.simulation.rendering.clothes import clothing
 from stseg.simulation.rendering.illumination import lit
 from stseg.simulation.rendering.ray_casting import PENUMBRA, darken, draw_bodies, pixel_boxes
 from stseg.simulation.rendering.room import render_room
-from stseg.simulation.scene import SceneSpec
+from stseg.simulation.scene import SceneSpec, Topic, random_stream
 from stseg.simulation.spoiling.detector import detect, visible_boxes
 
 LAMP = np.array([0.5, -0.35, 1.0]) / np.linalg.norm([0.5, -0.35, 1.0])
@@ -35,11 +34,13 @@ class RenderedView:
     """uint16 (v, u): id of the person that each pixel shows, 0 for background; also people just outside the area."""
     boxes: Boxes
     """Boxes of the simulated detector."""
+    spoiled: Bytes | None = None
+    """uint8 (v, u), 0..255: the silhouettes with errors; None where they are exact."""
 
     @property
     def mask(self) -> Bytes:
-        """Exact silhouettes of all people, uint8 (v, u), 0 or 255."""
-        return np.where(self.instances > 0, np.uint8(255), np.uint8(0))
+        """Silhouettes of all people, uint8 (v, u), 0 or 255 where they are exact."""
+        return np.where(self.instances > 0, np.uint8(255), np.uint8(0)) if self.spoiled is None else self.spoiled
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from stseg.arrays import Bytes, Floats, Singles
-from stseg.simulation.random_streams import Topic, random_stream
-from stseg.simulation.scene import SceneSpec
+from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
 _TILE, _JOINT = 0.6, 0.02  # metres
 _FLOOR = np.array([118.0, 128.0, 135.0])  # blue, green, red

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Boxes, Bytes
-from stseg.simulation.random_streams import Topic, random_stream
+from stseg.simulation.scene import Topic, random_stream
 
 People = NDArray[np.uint16]
 
@@ -75,19 +75,16 @@ def _disc(share: float, moment: Moment) -> Bytes:
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1)), np.uint8)
 
 
-def _dilation(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes:
-    del people
+def _dilation(mask: Bytes, _people: People, share: float, moment: Moment) -> Bytes:
     return np.asarray(cv2.dilate(mask, _disc(share, moment)), np.uint8)
 
 
-def _erosion(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes:
-    del people
+def _erosion(mask: Bytes, _people: People, share: float, moment: Moment) -> Bytes:
     return np.asarray(cv2.erode(mask, _disc(share, moment)), np.uint8)
 
 
-def _holes(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes:
+def _holes(mask: Bytes, _people: People, share: float, moment: Moment) -> Bytes:
     """Smooth noise below a quantile tears the silhouettes, in each frame anew."""
-    del people
     height, width = mask.shape
     grain = max(2, round(_HOLE_SIZE * moment.body_width))
     coarse = moment.stream("holes").random((height // grain + 2, width // grain + 2))
@@ -97,8 +94,7 @@ def _holes(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes:
     return np.where(noise < level, np.uint8(0), mask)
 
 
-def _legs(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes:
-    del moment
+def _legs(mask: Bytes, people: People, share: float, _moment: Moment) -> Bytes:
     cut = mask.copy()
     for one in _extents(people):
         knee = one.bottom - round(share * (one.bottom - one.top))
@@ -124,8 +120,7 @@ def _flicker(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes
     return left
 
 
-def _staying(mask: Bytes, people: People, number: float, moment: Moment) -> Bytes:
-    del people
+def _staying(mask: Bytes, _people: People, number: float, moment: Moment) -> Bytes:
     height, width = mask.shape
     spoiled = mask.copy()
     for blob in range(round(number)):
@@ -137,8 +132,7 @@ def _staying(mask: Bytes, people: People, number: float, moment: Moment) -> Byte
     return spoiled
 
 
-def _rain(mask: Bytes, people: People, number: float, moment: Moment) -> Bytes:
-    del people
+def _rain(mask: Bytes, _people: People, number: float, moment: Moment) -> Bytes:
     rng, spoiled = moment.stream("rain"), mask.copy()
     for _ in range(rng.poisson(number)):
         u, v = (int(rng.integers(side)) for side in mask.shape[::-1])
@@ -146,8 +140,7 @@ def _rain(mask: Bytes, people: People, number: float, moment: Moment) -> Bytes:
     return spoiled
 
 
-def _jpeg(mask: Bytes, people: People, strength: float, moment: Moment) -> Bytes:
-    del people, moment
+def _jpeg(mask: Bytes, _people: People, strength: float, _moment: Moment) -> Bytes:
     quality = max(1, round(100 * (1 - strength)))
     _, packed = cv2.imencode(".jpg", mask, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), np.uint8)

@@ -6,18 +6,16 @@ and the frame alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Boxes, Bytes, Floats, Rows
+from stseg.arrays import Boxes, Bytes, Floats
 from stseg.errors import ConfigError
-from stseg.geometry import Camera, Rig
+from stseg.geometry import Camera
 from stseg.geometry.rig import BODY_HEIGHT
-from stseg.simulation.film import SceneFilm
-from stseg.simulation.scene import Kind
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 
 _BODY_WIDTH = 0.42
@@ -56,74 +54,6 @@ STRENGTHS: dict[str, tuple[float, float, float]] = {
 """The kinds, each with a weak, a middle and a strong strength."""
 MAX_STRENGTHS = {kind: {"staying": 20.0, "rain": 1000.0}.get(kind, 1.0) for kind in STRENGTHS}
 """Greatest strength of each kind."""
-
-
-@dataclass(frozen=True, slots=True)
-class SpoiledView:
-    """One camera's frame, as of `stseg.simulation.rendering.render.RenderedView`; mask uint8 (v, u), 0..255."""
-
-    image: Bytes
-    instances: NDArray[np.uint16]
-    boxes: Boxes
-    mask: Bytes
-
-
-@dataclass(frozen=True, slots=True)
-class SpoiledFrame:
-    """One frame of all cameras, as of `stseg.simulation.film.RenderedFrame`."""
-
-    frame: int
-    truth: Rows
-    views: tuple[SpoiledView, ...]
-
-
-class SpoiledFilm:
-    """A film with errors in its masks and boxes, one after the other in the order of `spoils`."""
-
-    def __init__(self, film: SceneFilm, spoils: Sequence[Spoil]) -> None:
-        self.film, self.spoils = film, tuple(spoils)
-        centre = np.array([[np.mean(film.rig.grid.x), np.mean(film.rig.grid.y)]])
-        self._widths = [body_width(camera, centre) for camera in film.rig.cameras]
-
-    @property
-    def rig(self) -> Rig:
-        """The film's cameras and grid."""
-        return self.film.rig
-
-    @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return self.film.frames
-
-    @property
-    def kinds(self) -> tuple[Kind, ...]:
-        """Kinds of foreground that are written."""
-        return self.film.kinds
-
-    @property
-    def quality(self) -> int:
-        """JPEG quality of the colour frames, 1..100."""
-        return self.film.quality
-
-    def empty(self) -> Iterator[tuple[Bytes, ...]]:
-        """Frames of the empty room."""
-        return self.film.empty()
-
-    def frame_sets(self) -> Iterator[SpoiledFrame]:
-        """All frames in order."""
-        seed, rate = self.film.spec.seed, self.film.spec.frame_rate
-        for frame_set in self.film.frame_sets():
-            moments = (Moment(seed, k, frame_set.frame, rate, width) for k, width in enumerate(self._widths))
-            views = tuple(
-                SpoiledView(
-                    view.image,
-                    view.instances,
-                    spoiled_boxes(view.boxes, self.spoils, moment),
-                    spoiled_mask(view.mask, view.instances, self.spoils, moment),
-                )
-                for view, moment in zip(frame_set.views, moments, strict=True)
-            )
-            yield SpoiledFrame(frame_set.frame, frame_set.truth, views)
 
 
 def body_width(camera: Camera, ground: Floats) -> float:
