@@ -20,27 +20,18 @@ _ORTHONORMAL = 0.01  # by which printed rotations may miss
 
 @dataclass(frozen=True)
 class ForeignCamera:
-    """A camera in a foreign world.
-
-    Attributes
-    ----------
-    file
-        The calibration, for errors.
-    name
-        Its name in the calibration, or empty.
-    size
-        Width and height of its image, pixels; None where the calibration lacks them.
-    projection : float64 (3, 4)
-        Points of the foreign world to (undistorted) pixels.
-    lens
-        The lens, or None for an ideal image.
-    """
+    """A camera in a foreign world."""
 
     file: Path
+    """The calibration, for errors."""
     name: str
+    """Its name in the calibration, or empty."""
     size: tuple[int, int] | None
+    """Width and height of its image, pixels; None where the calibration lacks them."""
     projection: Floats
+    """float64 (3, 4): points of the foreign world to (undistorted) pixels."""
     lens: Lens | None = None
+    """The lens, or None for an ideal image."""
 
 
 class ForeignTable(Table):

@@ -21,21 +21,14 @@ from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """Options of the command line for calibrations that lack them.
-
-    Attributes
-    ----------
-    size
-        Width and height of the images, pixels.
-    unit
-        Unit of length, as `World` takes it.
-    head
-        Height of POM's head plane, metres.
-    """
+    """Options of the command line for calibrations that lack them."""
 
     size: tuple[int, int] | None
+    """Width and height of the images, pixels."""
     unit: str | None
+    """Unit of length, as `World` takes it."""
     head: float
+    """Height of POM's head plane, metres."""
 
 
 Reader = Callable[[Sequence[Path], ImportOptions], list[ForeignCamera]]

@@ -20,27 +20,18 @@ _NEEDED = ("camera", "u", "v", "x", "y")
 
 @dataclass(frozen=True)
 class PointTable:
-    """Point correspondences of one camera.
-
-    Attributes
-    ----------
-    file
-        The file.
-    camera
-        Its name.
-    pixel : float64 (n, 2)
-        u, v; pixel centres at integers.
-    place : float64 (n, 3)
-        x, y, z in the file's unit; z is 0 where the file has none.
-    line : int64 (n,)
-        Lines of the file.
-    """
+    """Point correspondences of one camera."""
 
     file: Path
+    """The file."""
     camera: str
+    """Its name."""
     pixel: Floats
+    """float64 (n, 2): u, v; pixel centres at integers."""
     place: Floats
+    """float64 (n, 3): x, y, z in the file's unit; z is 0 where the file has none."""
     line: Ints
+    """int64 (n,): lines of the file."""
 
 
 def read_points(path: Path) -> list[PointTable]:

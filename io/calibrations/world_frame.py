@@ -33,16 +33,6 @@ _HEIGHTS = (0.3, 60.0)  # metres, range of camera heights
 class World:
     """Unit, upward axis and handedness of a calibration.
 
-    Attributes
-    ----------
-    unit
-        Unit of length: mm, cm, m, or a number of metres.
-    up
-        The axis that points away from the ground. The others follow by half or quarter turns, which keep left and
-        right: with -z, X = x, Y = -y, Z = -z; with -y (a camera's own axes), X = x, Y = -z, Z = y.
-    mirrored
-        Whether it is left-handed, as grids whose rows count downwards: y is then reversed.
-
     Raises
     ------
     ConfigError
@@ -50,8 +40,12 @@ class World:
     """
 
     unit: str = "m"
+    """Unit of length: mm, cm, m, or a number of metres."""
     up: Up = "+z"
+    """The axis that points away from the ground. The others follow by half or quarter turns, which keep left and right:
+    with -z, X = x, Y = -y, Z = -z; with -y (a camera's own axes), X = x, Y = -z, Z = y."""
     mirrored: bool = False
+    """Whether it is left-handed, as grids whose rows count downwards: y is then reversed."""
 
     def __post_init__(self) -> None:
         try:

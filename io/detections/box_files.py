@@ -25,30 +25,20 @@ _MOT = (0, 2, 3, 4, 5, 6)  # frame, (id), left, top, width, height, conf
 
 @dataclass(frozen=True, slots=True)
 class BoxTable:
-    """All boxes of one view.
-
-    Attributes
-    ----------
-    frames
-        Number of frames; frames without boxes have no detections.
-    frame : int64 (n,)
-        The frame of each box, from 0, rising.
-    pixel : float64 (n, 4)
-        left, top, width, height.
-    score : float64 (n,)
-        0..1.
-    row : int64 (n,)
-        Which box of the file each is.
-    features : float32 (n, feature), or None
-        Appearance features.
-    """
+    """All boxes of one view."""
 
     frames: int
+    """Number of frames; frames without boxes have no detections."""
     frame: Ints
+    """int64 (n,): the frame of each box, from 0, rising."""
     pixel: Floats
+    """float64 (n, 4): left, top, width, height."""
     score: Floats
+    """float64 (n,): 0..1."""
     row: Ints
+    """int64 (n,): which box of the file each is."""
     features: Singles | None = None
+    """float32 (n, feature), or None: appearance features."""
 
     def at(self, frame: int) -> Boxes:
         """The boxes of one frame, in the file's order."""

@@ -27,61 +27,40 @@ _DIGITS = re.compile(r"[0-9]+")
 
 @dataclass(frozen=True)
 class Request:
-    """Request to a reader.
-
-    Attributes
-    ----------
-    path
-        File or folder.
-    size
-        Width and height of the camera's image, pixels.
-    view
-        Number of the camera in files that hold several, from 0; None where it is not given.
-    select
-        Pattern of image names in files that hold several cameras' images; empty for all.
-    image_list
-        File with the images of COCO results, or None.
-    columns
-        Names of the columns of a CSV or Parquet file, by the names of ours.
-    """
+    """Request to a reader."""
 
     path: Path
+    """File or folder."""
     size: tuple[int, int]
+    """Width and height of the camera's image, pixels."""
     view: int | None = None
+    """Number of the camera in files that hold several, from 0; None where it is not given."""
     select: str = ""
+    """Pattern of image names in files that hold several cameras' images; empty for all."""
     image_list: Path | None = None
+    """File with the images of COCO results, or None."""
     columns: Mapping[str, str] | None = None
+    """Names of the columns of a CSV or Parquet file, by the names of ours."""
 
 
 @dataclass(frozen=True)
 class Detections:
-    """All detections of one camera.
-
-    Attributes
-    ----------
-    frame : int64 (n,)
-        Frame of each detection, as the source counts them.
-    pixel : float64 (n, 4)
-        left, top, width, height in pixels.
-    score : float64 (n,)
-        0..1; 1 where the source gives none.
-    label
-        Class of each detection: its name, or its number as text; empty where the source has no classes.
-    mask
-        Mask of each detection, None where it has none; empty where the source has no masks.
-    frames
-        Number of frames where the source lists them all, counted from 0; None where it lists detections alone.
-    features : float32 (n, feature), or None
-        Appearance features.
-    """
+    """All detections of one camera."""
 
     frame: Ints
+    """int64 (n,): frame of each detection, as the source counts them."""
     pixel: Floats
+    """float64 (n, 4): left, top, width, height in pixels."""
     score: Floats
+    """float64 (n,): 0..1; 1 where the source gives none."""
     label: tuple[str, ...] = ()
+    """Class of each detection: its name, or its number as text; empty where the source has no classes."""
     mask: tuple[Mask | None, ...] = ()
+    """Mask of each detection, None where it has none; empty where the source has no masks."""
     frames: int | None = None
+    """Number of frames where the source lists them all, counted from 0; None where it lists detections alone."""
     features: Singles | None = None
+    """float32 (n, feature), or None: appearance features."""
 
     def __len__(self) -> int:
         return len(self.frame)

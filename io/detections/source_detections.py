@@ -29,24 +29,16 @@ _FEATURES = "a .npy array of numbers, one row a detection"
 
 @dataclass(frozen=True)
 class SourceDetections:
-    """Detections of one source.
-
-    Attributes
-    ----------
-    format
-        The recognised format.
-    read
-        All detections, frames as the source counts them.
-    kept
-        Those of the wanted classes and scores, frames counted from 0.
-    frames
-        Number of frames.
-    """
+    """Detections of one source."""
 
     format: str
+    """The recognised format."""
     read: Detections
+    """All detections, frames as the source counts them."""
     kept: Detections
+    """Those of the wanted classes and scores, frames counted from 0."""
     frames: int
+    """Number of frames."""
 
     @property
     def table(self) -> BoxTable:

@@ -15,26 +15,20 @@ from stseg.io.extras import load_extra
 from stseg.io.runfile.reading.run_reader import Run
 from stseg.io.untrusted.values import printable, require_utf8
 
-_TABLES: Mapping[str, tuple[tuple[str, str], ...]] = {
+_TABLES = {
     "recordings": (
-        ("recording", "TEXT"), ("file", "TEXT"), ("created", "TEXT"), ("frame_rate", "DOUBLE"), ("frames", "BIGINT"),
-        ("seconds", "DOUBLE"), ("cameras", "TEXT"), ("x0", "DOUBLE"), ("y0", "DOUBLE"), ("x1", "DOUBLE"),
-        ("y1", "DOUBLE"), ("tracks", "BIGINT"), ("people_mean", "DOUBLE"),
+        "recording TEXT, file TEXT, created TEXT, frame_rate DOUBLE, frames BIGINT, seconds DOUBLE, cameras TEXT, "
+        "x0 DOUBLE, y0 DOUBLE, x1 DOUBLE, y1 DOUBLE, tracks BIGINT, people_mean DOUBLE"
     ),
     "tracks": (
-        ("recording", "TEXT"), ("id", "BIGINT"), ("name", "TEXT"), ("first", "BIGINT"), ("last", "BIGINT"),
-        ("start", "DOUBLE"), ("seconds", "DOUBLE"), ("frames", "BIGINT"), ("height", "DOUBLE"), ("score", "DOUBLE"),
-        ("distance", "DOUBLE"),
+        "recording TEXT, id BIGINT, name TEXT, first BIGINT, last BIGINT, start DOUBLE, seconds DOUBLE, "
+        "frames BIGINT, height DOUBLE, score DOUBLE, distance DOUBLE"
     ),
-    "events": (
-        ("recording", "TEXT"), ("frame", "BIGINT"), ("time", "DOUBLE"), ("kind", "TEXT"), ("id", "BIGINT"),
-        ("other", "BIGINT"), ("reason", "TEXT"),
-    ),
+    "events": "recording TEXT, frame BIGINT, time DOUBLE, kind TEXT, id BIGINT, other BIGINT, reason TEXT",
     "trajectory": (
-        ("recording", "TEXT"), ("frame", "BIGINT"), ("time", "DOUBLE"), ("id", "BIGINT"), ("x", "DOUBLE"),
-        ("y", "DOUBLE"), ("height", "DOUBLE"), ("score", "DOUBLE"),
+        "recording TEXT, frame BIGINT, time DOUBLE, id BIGINT, x DOUBLE, y DOUBLE, height DOUBLE, score DOUBLE"
     ),
-}  # fmt: skip
+}
 """Columns of the tables; metres, seconds, nats. `recording` is the run file's name without its suffix."""
 
 
@@ -73,10 +67,10 @@ ARCHIVES: Mapping[str, Callable[[Path, Sequence[Run]], None]] = {"sqlite": write
 
 def _fill(connection: Any, runs: Sequence[Run]) -> None:
     for table, columns in _TABLES.items():
-        connection.execute(f"CREATE TABLE {table} ({', '.join(f'{name} {kind}' for name, kind in columns)})")
+        connection.execute(f"CREATE TABLE {table} ({columns})")
     for run in runs:
         for table, rows in _rows(run):
-            places = ", ".join("?" * len(_TABLES[table]))
+            places = ", ".join("?" * len(_TABLES[table].split(",")))
             if values := list(rows):
                 connection.executemany(f"INSERT INTO {table} VALUES ({places})", values)
 

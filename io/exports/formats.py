@@ -14,18 +14,12 @@ from stseg.io.runfile.reading.run_reader import Run
 
 @dataclass(frozen=True, slots=True)
 class ExportFormat:
-    """One format of tracks.
-
-    Attributes
-    ----------
-    write
-        Writes a run's tracks to a path.
-    about
-        What it is, for `stseg export --help`.
-    """
+    """One format of tracks."""
 
     write: Callable[[Path, Run], None]
+    """Writes a run's tracks to a path."""
     about: str
+    """What it is, for `stseg export --help`."""
 
 
 FORMATS: Mapping[str, ExportFormat] = {

@@ -156,24 +156,17 @@ def _end(stream: AlignedStream) -> float:
 
 @dataclass(frozen=True)
 class StreamIndex:
-    """Length and time stamps of a recording's streams, read to their ends.
-
-    Attributes
-    ----------
-    length
-        Frames of the recording.
-    times : float64 (n,) each
-        Time stamps of all frames of each file of each camera, milliseconds; nan where there is none.
-    frame_at_tick : int64 (tick,) or None each
-        `CameraSource.frame_at_tick` of each camera.
-    notes
-        Messages for the user, one line each.
-    """
+    """Length and time stamps of a recording's streams, read to their ends."""
 
     length: int
+    """Frames of the recording."""
     times: tuple[tuple[Floats, ...], ...]
+    """float64 (n,) each: time stamps of all frames of each file of each camera, milliseconds; nan where there is
+    none."""
     frame_at_tick: tuple[Ints | None, ...] = ()
+    """int64 (tick,) or None each: `CameraSource.frame_at_tick` of each camera."""
     notes: tuple[str, ...] = ()
+    """Messages for the user, one line each."""
 
     def coverage(self, recording: Recording) -> Flags:
         """Which frames of the indexed recording each camera shows, bool (camera, length)."""

@@ -75,35 +75,24 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class CameraSource:
-    """One camera's stream.
-
-    Attributes
-    ----------
-    source
-        Its frames.
-    background
-        Source of the empty scene, or None.
-    offset
-        Its frame k shows the scene at frame k + offset of the recording.
-    on_missing
-        Where its stream starts late or ends early: an error, or a blind view.
-    clock
-        Source of frame times: the files' time stamps, frame counts, or automatic
-        (`stseg.io.recording.time_alignment`).
-    images
-        Colour frames beside boxes, for pictures and colours; None where there are none.
-    frame_at_tick : int64 (tick,)
-        The camera's own frame shown at each tick, -1 where it is blind; None where frame k is shown at tick k, or
-        before alignment.
-    """
+    """One camera's stream."""
 
     source: Source
+    """Its frames."""
     background: Source | None = None
+    """Source of the empty scene, or None."""
     offset: int = 0
+    """Its frame k shows the scene at frame k + offset of the recording."""
     on_missing: Literal["error", "blind"] = "error"
+    """Where its stream starts late or ends early: an error, or a blind view."""
     clock: ClockSource = "auto"
+    """Source of frame times: the files' time stamps, frame counts, or automatic
+    (`stseg.io.recording.time_alignment`)."""
     images: Source | None = None
+    """Colour frames beside boxes, for pictures and colours; None where there are none."""
     frame_at_tick: Ints | None = field(default=None, compare=False, repr=False)
+    """int64 (tick,): the camera's own frame shown at each tick, -1 where it is blind; None where frame k is shown at
+    tick k, or before alignment."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,18 +41,12 @@ _END_TOLERANCE = 1.0
 
 @dataclass(frozen=True)
 class TimeAlignment:
-    """Which frame of each camera shows which tick, for all cameras.
-
-    Attributes
-    ----------
-    frame_at_tick : int64 (tick,) or None each
-        `CameraSource.frame_at_tick` of each camera.
-    notes
-        Messages for the user, one line each.
-    """
+    """Which frame of each camera shows which tick, for all cameras."""
 
     frame_at_tick: tuple[Ints | None, ...]
+    """int64 (tick,) or None each: `CameraSource.frame_at_tick` of each camera."""
     notes: tuple[str, ...]
+    """Messages for the user, one line each."""
 
 
 @dataclass(frozen=True)

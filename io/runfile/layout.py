@@ -14,20 +14,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Grid
-from stseg.records.tables import (
-    ANSWER,
-    APPEARANCE,
-    BOX,
-    CANDIDATE,
-    EVENT,
-    KNOWN_PERSON,
-    RATES,
-    SHIFT,
-    TIMING,
-    TRACK,
-    TRAJECTORY,
-    WINDOW,
-)  # fmt: skip
+from stseg.records import tables
 
 FORMAT = "stseg-run"
 VERSION = 2
@@ -39,25 +26,16 @@ AXES = ("time", "plane", "y", "x")
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One array of /entry/occupancy.
-
-    Attributes
-    ----------
-    name
-    dtype
-    axes
-        Names of the scales along it. Arrays with a time axis grow along it, one frame a chunk.
-    units
-        Empty for counts and names.
-    long_name
-        Label in viewers; it ends in the units.
-    """
+    """One array of /entry/occupancy."""
 
     name: str
     dtype: np.dtype[np.generic]
     axes: tuple[str, ...]
+    """Names of the scales along it. Arrays with a time axis grow along it, one frame a chunk."""
     units: str
+    """Empty for counts and names."""
     long_name: str
+    """Label in viewers; it ends in the units."""
 
 
 SCALES = (
@@ -102,26 +80,26 @@ ABOUT = {
 def table_types(views: int) -> dict[str, np.dtype[np.void]]:
     """The dtype of every table of a run with so many views."""
     return {
-        "trajectory": TRAJECTORY,
-        "tracks": TRACK,
-        "boxes": BOX,
-        "events": EVENT,
+        "trajectory": tables.TRAJECTORY,
+        "tracks": tables.TRACK,
+        "boxes": tables.BOX,
+        "events": tables.EVENT,
         "ghosts": ghost_type(views),
-        "windows": WINDOW,
-        "rates": RATES,
-        "shifts": SHIFT,
-        "timings": TIMING,
-        "committed": TRAJECTORY,
-        "committed_events": EVENT,
-        "appearance": APPEARANCE,
-        "answers": ANSWER,
-        "known_people": KNOWN_PERSON,
+        "windows": tables.WINDOW,
+        "rates": tables.RATES,
+        "shifts": tables.SHIFT,
+        "timings": tables.TIMING,
+        "committed": tables.TRAJECTORY,
+        "committed_events": tables.EVENT,
+        "appearance": tables.APPEARANCE,
+        "answers": tables.ANSWER,
+        "known_people": tables.KNOWN_PERSON,
     }
 
 
 def ghost_type(views: int) -> np.dtype[np.void]:
     """CANDIDATE and `parts`, float32 (views,): evidence of each view for the candidate, nats."""
-    return np.dtype([*CANDIDATE.descr, ("parts", "<f4", (views,))])
+    return np.dtype([*tables.CANDIDATE.descr, ("parts", "<f4", (views,))])
 
 
 ROOT_ATTRIBUTES: Mapping[str, str | int] = {

@@ -23,33 +23,21 @@ _HEADER, _END = b"\x78\x01", b"\x03\x00"
 
 
 class PackedFrame(NamedTuple):
-    """The log-odds or the labels of one frame, packed.
-
-    Attributes
-    ----------
-    filters
-        HDF5's mask of the filters that were left out.
-    data
-        The bytes of the chunk.
-    """
+    """The log-odds or the labels of one frame, packed."""
 
     filters: int
+    """HDF5's mask of the filters that were left out."""
     data: bytes
+    """The bytes of the chunk."""
 
 
 class PackedFrames(NamedTuple):
-    """The log-odds or the labels of consecutive frames of a run file.
-
-    Attributes
-    ----------
-    frames : int64 (time,)
-        Their numbers in the recording.
-    packed
-        One for each frame.
-    """
+    """The log-odds or the labels of consecutive frames of a run file."""
 
     frames: Ints
+    """int64 (time,): their numbers in the recording."""
     packed: list[PackedFrame]
+    """One for each frame."""
 
 
 def packed_frame(values: AnyArray) -> PackedFrame:

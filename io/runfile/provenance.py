@@ -49,30 +49,21 @@ SOURCE = np.dtype(
 
 @dataclass(frozen=True)
 class Provenance:
-    """Provenance of a run.
-
-    Attributes
-    ----------
-    created
-        Start of the run, ISO 8601, UTC.
-    config
-        The resolved configuration, TOML.
-    rig
-        The text of the rig file at `rig_path`, TOML.
-    versions
-        Of this package, Python and numerical libraries.
-    sources : SOURCE (n,)
-    frame_at_tick
-        `CameraSource.frame_at_tick` by camera, int64 (tick,), of cameras aligned in time.
-    """
+    """Provenance of a run."""
 
     created: str
+    """Start of the run, ISO 8601, UTC."""
     config: str
+    """The resolved configuration, TOML."""
     rig: str
+    """The text of the rig file at `rig_path`, TOML."""
     rig_path: Path
     versions: Mapping[str, str]
+    """Of this package, Python and numerical libraries."""
     sources: Rows
+    """SOURCE (n,)."""
     frame_at_tick: Mapping[str, Ints] = field(default_factory=dict)
+    """`CameraSource.frame_at_tick` by camera, int64 (tick,), of cameras aligned in time."""
 
 
 def gather_provenance(recording: Recording, config_text: str) -> Provenance:
@@ -140,7 +131,9 @@ def run_request(recording: Recording, provenance: Provenance) -> dict[str, Any]:
     """
     rig = parse_toml(provenance.rig)
     rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
-    sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _files_in_words(row) for row in provenance.sources}
+    sources = {
+        f"{os.fsdecode(row['camera'])}, {os.fsdecode(row['role'])}": _files_in_words(row) for row in provenance.sources
+    }
     config = parse_toml(provenance.config)
     samples = {
         camera.name: _samples(feed.source)
@@ -173,7 +166,7 @@ def _samples(source: Source) -> str:
 
 def _files_in_words(row: np.void) -> str:
     """Description of one stream's files."""
-    name = Path(_word(row["path"])).name
+    name = Path(os.fsdecode(row["path"])).name
     if not row["files"]:
         return f"{name}, which does not exist"
     return f"{name}, {row['files']} files, {row['size']} bytes in all, written {_moment(float(row['modified']))}"
@@ -185,10 +178,6 @@ def _moment(seconds: float) -> str:
         return datetime.fromtimestamp(seconds, UTC).isoformat()
     except (ValueError, OverflowError, OSError):  # before the year 1 or after 9999
         return f"{seconds:.0f} s from 1970"
-
-
-def _word(text: bytes | str) -> str:
-    return os.fsdecode(text)
 
 
 def _versions() -> dict[str, str]:
@@ -204,11 +193,8 @@ def _versions() -> dict[str, str]:
 def _sources(recording: Recording) -> Rows:
     rows = []
     for camera, streams in zip(recording.rig.cameras, recording.sources, strict=True):
-        rows.append((camera.name, b"frames", *_described(streams.source)))
-        if streams.background is not None:
-            rows.append((camera.name, b"background", *_described(streams.background)))
-        if streams.images is not None:
-            rows.append((camera.name, b"images", *_described(streams.images)))
+        roles = ((b"frames", streams.source), (b"background", streams.background), (b"images", streams.images))
+        rows += [(camera.name, role, *_described(source)) for role, source in roles if source is not None]
     return np.array(rows, SOURCE)
 
 

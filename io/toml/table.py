@@ -22,21 +22,14 @@ T = TypeVar("T", bound=str)
 
 @dataclass(frozen=True)
 class Table:
-    """One table of a TOML file.
-
-    Attributes
-    ----------
-    file
-        The file, for errors.
-    place
-        Where in the file the table stands (`camera[1] (cam2)`); empty for the file itself.
-    values
-        The parsed table.
-    """
+    """One table of a TOML file."""
 
     file: Path
+    """The file, for errors."""
     place: str
+    """Where in the file the table stands (`camera[1] (cam2)`); empty for the file itself."""
     values: Mapping[str, object]
+    """The parsed table."""
 
     def __contains__(self, name: str) -> bool:
         return name in self.values

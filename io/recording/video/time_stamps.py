@@ -27,21 +27,14 @@ _REGULAR = 0.5
 
 @dataclass(frozen=True)
 class TimeStamps:
-    """Frame positions of one camera on its own clock; tick 0 is the first frame of its first file.
-
-    Attributes
-    ----------
-    position : float64 (n,)
-        Position of each frame, ticks of the rig's clock, rising.
-    period
-        Usual distance of two frames, ticks.
-    steady
-        Whether all distances equal it: the stamps may then come from a header rather than a clock.
-    """
+    """Frame positions of one camera on its own clock; tick 0 is the first frame of its first file."""
 
     position: Floats
+    """float64 (n,): position of each frame, ticks of the rig's clock, rising."""
     period: float
+    """Usual distance of two frames, ticks."""
     steady: bool
+    """Whether all distances equal it: the stamps may then come from a header rather than a clock."""
 
     def fits(self, counted: Floats) -> bool:
         """Whether all stamps agree with positions by counting, float64 (n,) ticks, within half a tick."""

@@ -39,6 +39,23 @@ _FRAMES = 48
 """Frames that the curve is learned from, spread over the run: they hold some 10^5 cells in doubt."""
 
 
+class _Table(cached_property[Rows]):
+    """A table of a run file by the attribute's name, read and checked on its first use."""
+
+    def __init__(self, about: str) -> None:
+        super().__init__(self._read)
+        self.__doc__ = about
+
+    def _read(self, run: Run) -> Rows:
+        name = self.attrname or ""
+
+        def take(file: h5py.File) -> Rows:
+            dtype = layout.table_types(len(run.cameras))[name]
+            return read_whole(file[name], limits.ROWS * dtype.itemsize)
+
+        return require_table(run.bounds, name, read_object(run.path, f"/{name}", take))
+
+
 @dataclass(frozen=True)
 class Run:
     """The contents of a run file.
@@ -80,75 +97,20 @@ class Run:
         frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"
         return f"Run({str(self.path)!r}: {self.scene}, {frames}, {len(self.cameras)} cameras)"
 
-    @cached_property
-    def trajectory(self) -> Rows:
-        """TRAJECTORY (n,)."""
-        return self._table("trajectory")
-
-    @cached_property
-    def tracks(self) -> Rows:
-        """TRACK (n,)."""
-        return self._table("tracks")
-
-    @cached_property
-    def boxes(self) -> Rows:
-        """BOX (n,)."""
-        return self._table("boxes")
-
-    @cached_property
-    def events(self) -> Rows:
-        """EVENT (n,)."""
-        return self._table("events")
-
-    @cached_property
-    def ghosts(self) -> Rows:
-        """CANDIDATE (n,) with `parts`, float32 (views,)."""
-        return self._table("ghosts")
-
-    @cached_property
-    def windows(self) -> Rows:
-        """WINDOW (n,)."""
-        return self._table("windows")
-
-    @cached_property
-    def rates(self) -> Rows:
-        """RATES (n,)."""
-        return self._table("rates")
-
-    @cached_property
-    def shifts(self) -> Rows:
-        """SHIFT (n,)."""
-        return self._table("shifts")
-
-    @cached_property
-    def timings(self) -> Rows:
-        """TIMING (n,)."""
-        return self._table("timings")
-
-    @cached_property
-    def committed(self) -> Rows:
-        """TRAJECTORY (n,) before identities were decided, ids of the filter."""
-        return self._table("committed")
-
-    @cached_property
-    def committed_events(self) -> Rows:
-        """EVENT (n,) before identities were decided."""
-        return self._table("committed_events")
-
-    @cached_property
-    def appearance(self) -> Rows:
-        """APPEARANCE (n,)."""
-        return self._table("appearance")
-
-    @cached_property
-    def answers(self) -> Rows:
-        """ANSWER (n,): answers so far (`stseg correct`)."""
-        return self._table("answers")
-
-    @cached_property
-    def known_people(self) -> Rows:
-        """KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`)."""
-        return self._table("known_people")
+    trajectory = _Table("TRAJECTORY (n,).")
+    tracks = _Table("TRACK (n,).")
+    boxes = _Table("BOX (n,).")
+    events = _Table("EVENT (n,).")
+    ghosts = _Table("CANDIDATE (n,) with `parts`, float32 (views,).")
+    windows = _Table("WINDOW (n,).")
+    rates = _Table("RATES (n,).")
+    shifts = _Table("SHIFT (n,).")
+    timings = _Table("TIMING (n,).")
+    committed = _Table("TRAJECTORY (n,) before identities were decided, ids of the filter.")
+    committed_events = _Table("EVENT (n,) before identities were decided.")
+    appearance = _Table("APPEARANCE (n,).")
+    answers = _Table("ANSWER (n,): answers so far (`stseg correct`).")
+    known_people = _Table("KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`).")
 
     @cached_property
     def names(self) -> dict[int, str]:
@@ -185,7 +147,7 @@ class Run:
 
     def require_fit(self) -> None:
         """Raise FormatError where tables of tracks do not fit each other or the frames."""
-        require_fit(self._bounds, self.trajectory, self.boxes, self.tracks)
+        require_fit(self.bounds, self.trajectory, self.boxes, self.tracks)
 
     @property
     def detections(self) -> Rows:
@@ -249,7 +211,12 @@ class Run:
         index = int(np.searchsorted(self.frames, frame))
         if index == len(self.frames) or self.frames[index] != frame:
             raise ValueError(f"frame {frame} is not in {self.path}")
-        return read_object(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
+
+        def take(file: h5py.File) -> tuple[Singles, Labels]:
+            group = file[layout.OCCUPANCY]
+            return group["log_odds"][index].astype(np.float32), group["label"][index]
+
+        return read_object(self.path, layout.OCCUPANCY, take)
 
     @cached_property
     def cell_reliability(self) -> CellReliability:
@@ -270,22 +237,13 @@ class Run:
             dataset = file[layout.OCCUPANCY][field.name]
             for start in range(0, len(self.frames), number):
                 frames = self.frames[start : start + number]
-                yield PackedFrames(frames, [_packed_chunk(dataset, start + k) for k in range(len(frames))])
-
-    def _table(self, name: str) -> Rows:
-        def take(file: h5py.File) -> Rows:
-            dtype = layout.table_types(len(self.cameras))[name]
-            return read_whole(file[name], limits.ROWS * dtype.itemsize)
-
-        return require_table(self._bounds, name, read_object(self.path, f"/{name}", take))
+                chunks = (dataset.id.read_direct_chunk((start + k, 0, 0, 0)) for k in range(len(frames)))
+                yield PackedFrames(frames, [PackedFrame(*chunk) for chunk in chunks])
 
     @property
-    def _bounds(self) -> Bounds:
+    def bounds(self) -> Bounds:
+        """Frames and cameras to which the rows of tables refer."""
         return Bounds(self.path, self.frames, len(self.cameras))
-
-
-def _packed_chunk(dataset: h5py.Dataset, index: int) -> PackedFrame:
-    return PackedFrame(*dataset.id.read_direct_chunk((index, 0, 0, 0)))
 
 
 def read_run(path: Path | str) -> Run:
@@ -313,10 +271,6 @@ def _names(group: h5py.Group) -> dict[int, str]:
     if None in names or not all(map(is_title, names.values())):
         raise ValueError(f"names of tracks other than id,name with {EXPECTED_TITLE}")
     return {identity: name for identity, name in names.items() if identity is not None}
-
-
-def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:
-    return group["log_odds"][index].astype(np.float32), group["label"][index]
 
 
 def _checked_run(path: Path, file: h5py.File) -> Run:

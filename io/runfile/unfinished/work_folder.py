@@ -20,9 +20,8 @@ import os
 import re
 import secrets
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import Any, BinaryIO, NamedTuple, Self
 
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import create_part, output_error, publish_part, replacing, require_new, sync_folder
@@ -271,17 +270,8 @@ def _open_own(path: Path) -> BinaryIO:
     return os.fdopen(os.open(path, flags, 0o666), "r+b")
 
 
-@dataclass(frozen=True)
-class Difference:
-    """A difference between two requests.
-
-    Attributes
-    ----------
-    key
-        The differing key.
-    now, begun
-        Its value in the present request and in that of the unfinished run.
-    """
+class Difference(NamedTuple):
+    """A key that differs, with its values in the present request and in that of the unfinished run."""
 
     key: str
     now: str
