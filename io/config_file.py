@@ -1,22 +1,35 @@
-"""The configuration: TOML with a table a stage, overridden by assignments from the command line."""
+"""The configuration: TOML with a table a stage, overridden by assignments from the command line.
+
+The sections are nested frozen dataclasses, read and written whatever their keys. A setting may be a bool, int, float,
+str, a Literal of texts, a tuple of those, any of them or None, or a dataclass of settings, which is a table. TOML has
+no None: a setting that may be None must have it as its default, and is left out.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from textwrap import wrap
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from stseg.config import Config
 from stseg.config.keys import describe, is_user_key, values
 from stseg.errors import ConfigError
-from stseg.io.toml.settings import Given, as_toml, build
-from stseg.io.toml.text import parse_toml
+from stseg.io.toml.text import parse_toml, toml_value
+from stseg.io.untrusted.values import abbreviated, finite_number, one_of
 
 _OPTION = "--set"
 _HEAD = """# Configuration of stseg. Lines may be left out: what is not given has its default.
 # Checked with every run; `stseg config --expert` prints the constants of the methods as well.
 
 """
+T = TypeVar("T")
+
+_COMMENT = 110
+"""Width of a comment, characters."""
+_WORDS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a text"}
 
 
 def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
@@ -35,10 +48,14 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
         Where the file cannot be read, a key is unknown, or a value of the wrong type or out of its range; it names the
         file or --set, and the key.
     """
-    given: dict[str, Any] = {} if path is None else _wrapped(_read_toml(Path(path)), str(path))
-    for assignment in assignments:
-        _assign(given, assignment)
-    return build(Config, given, _OPTION if path is None else str(path))
+    if path is None:
+        return parse_config("", _OPTION, assignments)
+    try:
+        return parse_config(Path(path).read_bytes().decode("utf-8-sig"), str(path), assignments)
+    except OSError as error:
+        raise ConfigError(path, "", error.strerror or error, "a configuration file") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, "", f"what is not TOML ({error})", "TOML") from error
 
 
 def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Config:
@@ -76,15 +93,6 @@ def describe_config(config: Config, *, expert: bool) -> str:
     return _HEAD + as_toml(config, comment=comment)
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return parse_toml(path.read_bytes().decode("utf-8-sig"))
-    except OSError as error:
-        raise ConfigError(path, "", error.strerror or error, "a configuration file") from error
-    except ValueError as error:
-        raise ConfigError(path, "", f"what is not TOML ({error})", "TOML") from error
-
-
 def _wrapped(table: Mapping[str, Any], place: str) -> dict[str, Any]:
     return {
         name: _wrapped(value, place) if isinstance(value, dict) else Given(value, place)
@@ -112,3 +120,134 @@ def _value(text: str) -> Any:
     except ValueError:
         return text
     return table["value"] if len(table) == 1 else text
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A value from the user, and the file or option that it stands in."""
+
+    value: object
+    place: str
+
+
+GivenTree = Mapping[str, "Given | GivenTree"]
+
+
+def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
+    """Settings of this kind: what is given, and defaults for the rest.
+
+    Parameters
+    ----------
+    kind
+        The dataclass.
+    given
+        Values by name, and tables of them.
+    place
+        What to name where a fault lies in no single value.
+    table
+        Full name of the table that the settings stand in; empty at the top.
+
+    Raises
+    ------
+    ConfigError
+        Where a name is unknown, a value of another type, or out of the range that the dataclass itself holds to.
+    """
+    hints = get_type_hints(kind)
+    values = {}
+    for name, entry in given.items():
+        key = _join(table, name)
+        if name not in hints:
+            raise ConfigError(_place(entry, place), key, "an unknown key", one_of(name, hints))
+        values[name] = _built(hints[name], entry, place, key)
+    try:
+        return kind(**values)
+    except ConfigError as error:
+        key = _join(table, error.key)
+        raise ConfigError(_place(given.get(error.key), place), key, error.found, error.expected) from error
+
+
+def as_toml(settings: Any, table: str = "", comment: Callable[[str], str | None] | None = None) -> str:
+    """The TOML text of settings; `build` of it gives back the same.
+
+    Parameters
+    ----------
+    settings
+        The dataclass.
+    table
+        Full name of its table; empty at the top.
+    comment
+        Comment above a key, which is given in full; None to leave the key out.
+    """
+    lines, tables = [], []
+    for field in fields(settings):
+        value, key = getattr(settings, field.name), _join(table, field.name)
+        if is_dataclass(value):
+            tables.append(as_toml(value, key, comment))
+        elif value is not None:
+            above = "" if comment is None else comment(key)
+            if above is not None:
+                lines += [f"# {line}" for line in wrap(above, _COMMENT)] + [f"{field.name} = {toml_value(value)}"]
+    head = [f"[{table}]"] if table else []
+    body = ["\n".join([*head, *lines]) + "\n"] if lines else []
+    return "\n".join(body + [text for text in tables if text])
+
+
+def _built(hint: Any, entry: Given | GivenTree, place: str, key: str) -> Any:
+    if is_dataclass(hint):
+        if isinstance(entry, Given):
+            raise ConfigError(entry.place, key, abbreviated(entry.value), "a table")
+        return build(cast(type[Any], hint), entry, place, key)
+    if not isinstance(entry, Given):
+        raise ConfigError(_place(entry, place), key, "a table", _in_words(hint))
+    value = _converted(hint, entry.value)
+    if value is None:
+        raise ConfigError(entry.place, key, abbreviated(entry.value), _in_words(hint))
+    return value
+
+
+def _converted(hint: Any, value: object) -> Any:
+    """The value as the type asks for it; None where it does not fit."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return value if value in arguments else None
+    if origin in (Union, UnionType):
+        fits = (_converted(argument, value) for argument in arguments if argument is not NoneType)
+        return next((fit for fit in fits if fit is not None), None)
+    if origin is tuple:
+        return _converted_items(arguments, value)
+    if hint is float and type(value) in (int, float):
+        return finite_number(value)
+    return value if type(value) is hint else None
+
+
+def _converted_items(hints: tuple[Any, ...], value: object) -> tuple[Any, ...] | None:
+    if not isinstance(value, list):
+        return None
+    wanted = (hints[0],) * len(value) if hints[-1] is ... else hints
+    if len(wanted) != len(value):
+        return None
+    items = tuple(_converted(hint, item) for hint, item in zip(wanted, value, strict=True))
+    return None if None in items else items
+
+
+def _in_words(hint: Any) -> str:
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return f"one of {', '.join(map(str, arguments))}"
+    if origin in (Union, UnionType):
+        return " or ".join(_in_words(argument) for argument in arguments if argument is not NoneType)
+    if origin is tuple:
+        count = "a list" if arguments[-1] is ... else f"a list of {len(arguments)}"
+        return f"{count}, each {_in_words(arguments[0])}"
+    return _WORDS[hint]
+
+
+def _place(entry: Given | GivenTree | None, place: str) -> str:
+    """Where something was given; of a table, where its first value was."""
+    while isinstance(entry, Mapping):
+        entry = next(iter(entry.values()), None)
+    return place if entry is None else entry.place
+
+
+def _join(table: str, name: str) -> str:
+    return f"{table}.{name}" if table and name else table or name

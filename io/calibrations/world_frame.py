@@ -113,12 +113,7 @@ def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False)
 
 
 def require_height(cameras: Sequence[ForeignCamera], world: World) -> None:
-    """Refuse a unit with implausible camera heights where another unit gives plausible ones.
-
-    Raises
-    ------
-    CalibrationError
-    """
+    """Refuse a unit with implausible camera heights where another gives plausible ones; raises CalibrationError."""
     height = median_height(cameras, world)
     if height <= 0 or _HEIGHTS[0] <= height <= _HEIGHTS[1]:
         return

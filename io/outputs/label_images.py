@@ -24,12 +24,7 @@ _BYTE, _WORD = 255, 65535
 
 
 def require_label_folder(folder: Path, overwrite: bool) -> None:
-    """Refuse a folder that holds something, before any work is done.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse a folder that holds something, before any work is done; raises OutputError."""
     try:
         if folder.exists() and any(folder.iterdir()) and not overwrite:
             raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
@@ -71,12 +66,7 @@ class LabelImages:
             raise output_error(folder, error) from error
 
     def write(self, camera: str, frame: int, ids: Ints) -> None:
-        """Write one image, int64 (v, u).
-
-        Raises
-        ------
-        OutputError
-        """
+        """Write one image, int64 (v, u); raises OutputError."""
         path = self._folder_of(camera) / f"{frame:06d}.png"
         try:
             write_quickly(path, self._encoded(ids))

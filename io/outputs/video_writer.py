@@ -16,12 +16,7 @@ _ENDING = ".mp4"
 
 
 def require_film_name(path: Path) -> None:
-    """Refuse a name without the ending of a video that is written here.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse a name without the ending of a video that is written here; raises OutputError."""
     if path.suffix.lower() != _ENDING:
         raise OutputError(path, "", f"the ending {path.suffix!r}", f"a name that ends in {_ENDING}")
 

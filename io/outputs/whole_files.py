@@ -25,12 +25,7 @@ _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 
 
 def require_new(path: Path, overwrite: bool) -> None:
-    """Refuse an output that exists or cannot be made, before any work is done.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse an output that exists or cannot be made, before any work is done; raises OutputError."""
     try:
         if path.is_dir():
             raise OutputError(path, "", "a folder", "the name of a file")
@@ -178,12 +173,7 @@ def write_file(path: Path, data: bytes, overwrite: bool = True) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder unless it exists.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Make a folder unless it exists; raises OutputError."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.geometry import Camera
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source
-from stseg.io.toml.text import toml_string
+from stseg.io.toml.text import toml_string, toml_value
 
 FORMAT = 1
 
@@ -80,36 +80,25 @@ def _stream_lines(streams: CameraSource, folder: Path) -> list[str]:
 
 
 def _source_text(source: Source, folder: Path) -> str:
-    entries = [f"kind = {toml_string(source.kind)}", f"path = {_paths(source, folder)}"]
-    if source.first_frame:
-        entries.append(f"first_frame = {source.first_frame}")
-    if source.frames is not None:
-        entries.append(f"frames = {source.frames}")
-    if source.classes:
-        entries.append(f"classes = [{', '.join(map(toml_string, source.classes))}]")
-    if source.least_score:
-        entries.append(f"score = {_number(source.least_score)}")
-    if source.view is not None:
-        entries.append(f"view = {source.view}")
-    if source.select:
-        entries.append(f"select = {toml_string(source.select)}")
-    if source.image_list is not None:
-        entries.append(f"image_list = {toml_string(_relative(source.image_list, folder).as_posix())}")
-    if source.appearance is not None:
-        entries.append(f"appearance = {toml_string(_relative(source.appearance, folder).as_posix())}")
-    if source.columns:
-        pairs = ", ".join(f"{toml_string(column)} = {toml_string(name)}" for column, name in source.columns)
-        entries.append(f"columns = {{ {pairs} }}")
-    if source.starts:
-        entries.append(f"starts = {_list(np.array(source.starts))}")
-    return f"{{ {', '.join(entries)} }}"
+    def relative(path: Path | None) -> str | None:
+        return None if path is None else _relative(path, folder).as_posix()
 
-
-def _paths(source: Source, folder: Path) -> str:
-    if source.address:
-        return toml_string(source.address)
-    names = [toml_string(_relative(path, folder).as_posix()) for path in (source.path, *source.more)]
-    return f"[{', '.join(names)}]" if source.more else names[0]
+    paths = [relative(path) for path in (source.path, *source.more)]
+    values = {
+        "kind": source.kind,
+        "path": source.address or (paths if source.more else paths[0]),
+        "first_frame": source.first_frame or None,
+        "frames": source.frames,
+        "classes": source.classes or None,
+        "score": float(source.least_score) or None,
+        "view": source.view,
+        "select": source.select or None,
+        "image_list": relative(source.image_list),
+        "appearance": relative(source.appearance),
+        "columns": dict(source.columns) or None,
+        "starts": [float(start) for start in source.starts] or None,
+    }
+    return f"{{ {', '.join(f'{key} = {toml_value(value)}' for key, value in values.items() if value is not None)} }}"
 
 
 def _relative(path: Path, folder: Path) -> Path:
@@ -123,7 +112,7 @@ def _number(number: float) -> str:
 
 
 def _list(numbers: Floats) -> str:
-    return f"[{', '.join(map(_number, numbers))}]"
+    return toml_value([float(number) for number in numbers])
 
 
 def _rows(matrix: Floats) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -50,10 +50,7 @@ class Table:
 
     def text(self, name: str) -> str:
         """A string that is not empty."""
-        value = self._get(name, "a text")
-        if not isinstance(value, str) or not value.strip():
-            raise self.error(name, abbreviated(value), "a text")
-        return value
+        return str(self._checked(name, "a text", _is_text))
 
     def name(self, name: str) -> str:
         """The name of a camera or scene, see `stseg.io.untrusted.values`."""
@@ -72,11 +69,12 @@ class Table:
 
     def texts(self, name: str) -> list[str]:
         """A string that is not empty, or a list of such strings."""
-        value = self._get(name, "a text or a list of texts")
-        values = value if isinstance(value, list) else [value]
-        if not values or not all(isinstance(text, str) and text.strip() for text in values):
-            raise self.error(name, abbreviated(value), "a text or a list of texts")
-        return [str(text) for text in values]
+        value = self._checked(
+            name,
+            "a text or a list of texts",
+            lambda value: _is_text(value) or (isinstance(value, list) and len(value) > 0 and all(map(_is_text, value))),
+        )
+        return value if isinstance(value, list) else [value]
 
     def choice(self, name: str, choices: Iterable[T]) -> T:
         """One of a few strings."""
@@ -90,17 +88,12 @@ class Table:
     def integer(self, name: str, low: int, high: int) -> int:
         """A whole number within [low, high]."""
         expected = f"a whole number from {low} to {high}"
-        value = self._get(name, expected)
-        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-            raise self.error(name, abbreviated(value), expected)
-        return value
+        value = self._checked(name, expected, lambda value: type(value) is int and low <= value <= high)
+        return int(value)
 
     def truth(self, name: str) -> bool:
         """True or false."""
-        value = self._get(name, "true or false")
-        if not isinstance(value, bool):
-            raise self.error(name, abbreviated(value), "true or false")
-        return value
+        return bool(self._checked(name, "true or false", lambda value: isinstance(value, bool)))
 
     def within(self, name: str, bounds: tuple[float, float]) -> float:
         """A finite number within bounds."""
@@ -115,9 +108,7 @@ class Table:
         None of them may be larger than `largest` in size.
         """
         expected = _shape_in_words(shape)
-        value = self._get(name, expected)
-        if not _has_shape(value, shape):
-            raise self.error(name, abbreviated(value), expected)
+        value = self._checked(name, expected, lambda value: _has_shape(value, shape))
         array = np.array(value, float)
         wrong = ~(np.abs(array) <= largest) | ~np.isfinite(array)
         if wrong.any():
@@ -127,25 +118,36 @@ class Table:
 
     def table(self, name: str) -> Self:
         """The table below this key."""
-        value = self._get(name, "a table")
-        if not isinstance(value, dict):
-            raise self.error(name, abbreviated(value), "a table")
+        value = self._checked(name, "a table", lambda value: isinstance(value, dict))
         return type(self)(self.file, self.key(name), value)
 
     def tables(self, name: str, most: int) -> tuple[Self, ...]:
         """The tables of an array of tables, one to `most`, counted from 0."""
         expected = f"one [[{name}]] or more"
-        value = self._get(name, expected)
-        if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
-            raise self.error(name, abbreviated(value), expected)
+        value = self._checked(name, expected, _is_list_of_tables)
         if len(value) > most:
             raise self.error(name, f"{len(value)} of them", f"at most {most}")
         return tuple(type(self)(self.file, f"{self.key(name)}[{index}]", row) for index, row in enumerate(value))
+
+    def _checked(self, name: str, expected: str, holds: Callable[[Any], bool]) -> Any:
+        """The value of a key, for which something holds."""
+        value = self._get(name, expected)
+        if not holds(value):
+            raise self.error(name, abbreviated(value), expected)
+        return value
 
     def _get(self, name: str, expected: str) -> object:
         if name not in self.values:
             raise self.error(name, "nothing", expected)
         return self.values[name]
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and value.strip() != ""
+
+
+def _is_list_of_tables(value: object) -> bool:
+    return isinstance(value, list) and len(value) > 0 and all(isinstance(row, dict) for row in value)
 
 
 def _has_shape(value: object, shape: tuple[int, ...]) -> bool:

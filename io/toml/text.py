@@ -36,3 +36,14 @@ def toml_string(text: str) -> str:
     """A text as a basic string of TOML."""
     # TOML's basic strings are JSON's, but for the delete character.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML: truths, numbers, texts, lists or tuples of them, and tables of one line."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{toml_string(name)} = {toml_value(one)}' for name, one in value.items())} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, str):
+        return toml_string(value)
+    return repr(value).lower() if isinstance(value, bool) else repr(value)

@@ -23,7 +23,7 @@ class Settings:
     Raises
     ------
     ConfigError
-        With the place "configuration"; `stseg.io.toml.settings.build` puts there where the user wrote it.
+        With the place "configuration"; `stseg.io.config_file.build` puts there where the user wrote it.
     """
 
     def __post_init__(self) -> None:

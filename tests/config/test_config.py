@@ -16,8 +16,7 @@ from stseg.config import BodyConfig, Config
 from stseg.config.keys import USER_KEYS, describe, require_effect, values
 from stseg.config.ranges import require
 from stseg.errors import ConfigError
-from stseg.io.config_file import describe_config, format_config, read_config
-from stseg.io.toml.settings import Given, as_toml, build
+from stseg.io.config_file import Given, as_toml, build, describe_config, format_config, read_config
 
 TOML = """
 [detection]
