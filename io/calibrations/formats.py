@@ -62,8 +62,7 @@ FORMATS: Mapping[str, CalibrationFormat] = {
         "one FileStorage XML a camera, or two joined with a plus sign (`intrinsic.xml+extrinsic.xml`)",
     ),
     "matrix": CalibrationFormat(
-        _without_options(read_projection),
-        "one 3x4 projection matrix a camera, as .txt, .csv, .npy, .npz or .mat",
+        _without_options(read_projection), "one 3x4 projection matrix a camera, as .txt, .csv, .npy, .npz or .mat"
     ),
     "tsai": CalibrationFormat(_without_options(read_tsai_xml), "one XML a camera, as PETS 2009 has them"),
     "pom": CalibrationFormat(

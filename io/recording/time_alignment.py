@@ -191,10 +191,7 @@ def _trusted_stamps(camera: _CameraTimes, others: Sequence[_CameraTimes], rate: 
     if source.clock == "stamps":
         return stamps, ""
     if not stamps.steady:
-        return (
-            stamps,
-            'the time stamps vary; each tick shows the nearest frame (clock = "count" would count)',
-        )
+        return (stamps, 'the time stamps vary; each tick shows the nearest frame (clock = "count" would count)')
     rates = f"the time stamps say {stamps.rate * rate:.4g} frames per second, the rig {rate:.4g}"
     references = [other for other in others if other.keeps_rate or other.source.clock == "stamps"]
     if not references or _same_count(camera, stamps, references):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.box_files import BoxTable, read_boxes
@@ -90,26 +91,19 @@ def test_bad_lines_are_named(tmp_path: Path, line: str, reported: str) -> None:
     ],
 )
 def test_files_of_another_form_are_refused(tmp_path: Path, text: str, reported: str) -> None:
-    with pytest.raises(FormatError, match=reported):
-        read(tmp_path, text, frames=3)
+    refused(FormatError, reported, read, tmp_path, text, frames=3)
 
 
 def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
-    with pytest.raises(SourceError, match="found no boxes"):
-        read(tmp_path, "")
-    with pytest.raises(SourceError, match="No such file"):
-        read_boxes(tmp_path / "none.csv")
-    with pytest.raises(SourceError, match="expected a file of boxes"):
-        read_boxes(tmp_path)
+    refused(SourceError, "found no boxes", read, tmp_path, "")
+    refused(SourceError, "No such file", read_boxes, tmp_path / "none.csv")
+    refused(SourceError, "expected a file of boxes", read_boxes, tmp_path)
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(FormatError, match="text file in UTF-8"):
-        read_boxes(tmp_path / "binary")
+    refused(FormatError, "text file in UTF-8", read_boxes, tmp_path / "binary")
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.lists(st.tuples(st.integers(3, 9), *[st.floats(0, 1e4) for _ in range(4)], st.floats(0, 1)), min_size=1),
-)
+@given(st.lists(st.tuples(st.integers(3, 9), *[st.floats(0, 1e4) for _ in range(4)], st.floats(0, 1)), min_size=1))
 def test_each_box_is_found_in_its_frame_in_the_order_of_the_file(tmp_path: Path, rows: list[tuple[float, ...]]) -> None:
     header = "frame,left,top,width,height,score\n"
     table = read(tmp_path, header + "".join(",".join(map(repr, row)) + "\n" for row in rows), first_frame=3)

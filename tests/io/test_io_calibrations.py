@@ -10,6 +10,7 @@ from cyclopts import CycloptsError
 from hypothesis import given
 from hypothesis import strategies as st
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
+from refusals import refused
 from strategies import BARREL, Pose, numbers, poses
 
 from stseg.arrays import Floats
@@ -132,8 +133,7 @@ class TestOpencvXml:
     )
     def test_refuses_and_names_the_node(self, tmp_path: Path, old: str, new: str, complaint: str) -> None:
         assert old in whole()
-        with pytest.raises(FormatError, match=rf"config.xml.*{complaint}"):
-            opencv_camera(whole().replace(old, new), tmp_path)
+        refused(FormatError, rf"config.xml.*{complaint}", opencv_camera, whole().replace(old, new), tmp_path)
 
     def test_coefficients_of_a_larger_model_may_be_zero(self, tmp_path: Path) -> None:
         camera = opencv_camera(whole(np.array([*BARREL, 0.0, 0.0, 0.0])), tmp_path)
@@ -148,8 +148,7 @@ class TestOpencvXml:
             read_opencv_xml([file])
 
     def test_missing_file(self, tmp_path: Path) -> None:
-        with pytest.raises(FormatError, match=r"nowhere.xml: found No such file"):
-            read_opencv_xml([tmp_path / "nowhere.xml"])
+        refused(FormatError, r"nowhere.xml: found No such file", read_opencv_xml, [tmp_path / "nowhere.xml"])
 
 
 class TestProjection:
@@ -182,26 +181,20 @@ class TestProjection:
     def test_refuses_other_contents(self, tmp_path: Path, suffix: str, content: bytes) -> None:
         file = tmp_path / f"cam{suffix}"
         file.write_bytes(content)
-        with pytest.raises(FormatError, match=rf"cam{suffix}: found .* expected one 3x4 projection matrix"):
-            read_projection([file])
+        refused(FormatError, rf"cam{suffix}: found .* expected one 3x4 projection matrix", read_projection, [file])
 
     @pytest.mark.parametrize("suffix", [".txt", ".npy", ".npz", ".mat"])
     def test_missing_file(self, tmp_path: Path, suffix: str) -> None:
-        with pytest.raises(FormatError, match=r"No such file"):
-            read_projection([tmp_path / f"nowhere{suffix}"])
+        refused(FormatError, r"No such file", read_projection, [tmp_path / f"nowhere{suffix}"])
 
     def test_refuses_what_is_not_one_matrix(self, tmp_path: Path) -> None:
         np.savez(tmp_path / "two.npz", a=self.matrix, b=self.matrix)
-        with pytest.raises(FormatError, match=r"2 arrays of that shape \(a, b\)"):
-            read_projection([tmp_path / "two.npz"])
+        refused(FormatError, r"2 arrays of that shape \(a, b\)", read_projection, [tmp_path / "two.npz"])
         np.save(tmp_path / "nan.npy", self.matrix * np.nan)
-        with pytest.raises(FormatError, match=r"no finite numbers"):
-            read_projection([tmp_path / "nan.npy"])
+        refused(FormatError, r"no finite numbers", read_projection, [tmp_path / "nan.npy"])
         np.save(tmp_path / "objects.npy", self.matrix.astype(object))
-        with pytest.raises(FormatError, match=r"cannot be read"):
-            read_projection([tmp_path / "objects.npy"])
-        with pytest.raises(FormatError, match=r"the suffix '.yml', expected one of .txt"):
-            read_projection([tmp_path / "cam.yml"])
+        refused(FormatError, r"cannot be read", read_projection, [tmp_path / "objects.npy"])
+        refused(FormatError, r"the suffix '.yml', expected one of .txt", read_projection, [tmp_path / "cam.yml"])
 
 
 class TestRealCalibrations:
@@ -339,8 +332,7 @@ class TestCommand:
     def test_existing_rig_is_kept(self, calibrations: list[str]) -> None:
         Path("room.toml").write_text("mine")
         tokens = ("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml")
-        with pytest.raises(OutputError, match=r"room.toml: found a file that exists, expected a new name, or --over"):
-            calibrate(*tokens)
+        refused(OutputError, r"room.toml: found a file that exists, expected a new name, or --over", calibrate, *tokens)
         assert Path("room.toml").read_text() == "mine"
         calibrate(*tokens, "--overwrite")
         assert len(read_recording("room.toml").rig.cameras) == 2
@@ -369,8 +361,7 @@ class TestCommand:
     def test_says_what_to_mend(
         self, calibrations: list[str], token: str, kind: type[Exception], complaint: str
     ) -> None:
-        with pytest.raises(kind, match=complaint):
-            calibrate("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml", token)
+        refused(kind, complaint, calibrate, "opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml", token)
         assert not Path("room.toml").exists()
 
     def test_score_out_of_range(self, calibrations: list[str]) -> None:
@@ -380,10 +371,8 @@ class TestCommand:
 
     def test_which_files(self, calibrations: list[str]) -> None:
         options = (*SCENE, *SOURCE, "-o=room.toml")
-        with pytest.raises(ConfigError, match=r"found nothing, expected one calibration a camera"):
-            calibrate("opencv", *options)
-        with pytest.raises(FormatError, match=r"nowhere.xml: found No such file"):
-            calibrate("opencv", "nowhere.xml", *options)
+        refused(ConfigError, r"found nothing, expected one calibration a camera", calibrate, "opencv", *options)
+        refused(FormatError, r"nowhere.xml: found No such file", calibrate, "opencv", "nowhere.xml", *options)
         Path("left/left").mkdir()
         Path("left/left/config.xml").write_text(whole())
         with pytest.raises(ConfigError, match=r"--names: found files and folders that share"):

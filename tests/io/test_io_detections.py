@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from stseg.errors import FormatError, InputError, RigError, SourceError
 from stseg.io.detections.masks import flat_polygons, run_lengths
@@ -270,13 +271,11 @@ def test_a_malformed_table_of_parquet_is_one_line(
 def test_broken_parquet_and_unknown_json_are_named(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     (tmp_path / "b.parquet").write_bytes(b"no")
-    with pytest.raises(FormatError, match="no Parquet"):
-        read_source(source(tmp_path / "b.parquet"), SIZE)
+    refused(FormatError, "no Parquet", read_source, source(tmp_path / "b.parquet"), SIZE)
     with pytest.raises(FormatError, match="of no known detections, expected one of Ultralytics text, WILDTRACK"):
         read_source(source(dump(tmp_path / "x.json", {"a": 1})), SIZE)
     (tmp_path / "y.json").write_text("{\n no json")
-    with pytest.raises(FormatError, match=r"y.json: line 2: found no JSON"):
-        read_source(source(tmp_path / "y.json"), SIZE)
+    refused(FormatError, r"y.json: line 2: found no JSON", read_source, source(tmp_path / "y.json"), SIZE)
 
 
 def test_classes_and_scores_choose(tmp_path: Path) -> None:
@@ -312,8 +311,7 @@ def test_run_lengths_are_cocos() -> None:
     mask[4, 3] = 1
     np.testing.assert_array_equal(run_lengths([6, 8], "=331OO10;").draw((8, 6)), mask)
     np.testing.assert_array_equal(run_lengths([6, 8], [13, 3, 3, 4, 2, 3, 3, 3, 14]).draw((8, 6)), mask)
-    with pytest.raises(ValueError, match="for an image of 8 x 7"):
-        run_lengths([7, 8], "=331OO10;")
+    refused(ValueError, "for an image of 8 x 7", run_lengths, [7, 8], "=331OO10;")
 
 
 def test_masks_become_instances(tmp_path: Path, camera: Any) -> None:
@@ -338,8 +336,7 @@ def camera() -> Any:
 
 
 def test_polygons_need_three_points() -> None:
-    with pytest.raises(ValueError, match="fewer than 3 points"):
-        flat_polygons([[0, 0, 1, 1]])
+    refused(ValueError, "fewer than 3 points", flat_polygons, [[0, 0, 1, 1]])
 
 
 def test_images_at_equal_steps_are_consecutive_frames() -> None:
@@ -377,8 +374,7 @@ images = {{ kind = "video", path = "x.mp4" }}
     assert read_recording(path).pictured().sources[0].source.kind == "video"
     for wrong, message in (("score = 3", "a number of 0..1"), ('columns = { frme = "t" }', "did you mean frame")):
         path.write_text(text.replace("SOURCE", wrong))
-        with pytest.raises(RigError, match=message):
-            read_recording(path)
+        refused(RigError, message, read_recording, path)
 
 
 def test_inspect_says_what_a_rig_delivers_and_draws_it(
@@ -411,5 +407,4 @@ source = { kind = "boxes", path = "labels" }
     assert "do its frames count from 1? (first_frame = 1)" in printed
     assert (tmp_path / "pictures" / "a.png").stat().st_size > 1000
     (tmp_path / "labels" / "walk_1.txt").write_text("0 0.5\n")
-    with pytest.raises(FormatError, match=r"walk_1\.txt, line 1"):
-        inspect(rig)
+    refused(FormatError, r"walk_1\.txt, line 1", inspect, rig)

@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from refusals import refused
 from scenes import Moment, box_moments, looking, mask_moments, rig_of, standing_at, walkers
 
 from stseg.arrays import Boxes, Bytes, Rows
@@ -88,17 +89,14 @@ def test_ids_are_read_back_and_the_kind_is_that_of_the_largest(tmp_path: Path, l
 def test_a_folder_with_files_is_refused_and_old_images_go(tmp_path: Path) -> None:
     images = LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
     images.write("west", 99, np.zeros((4, 4), np.int64))
-    with pytest.raises(OutputError, match="files in it"):
-        LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
+    refused(OutputError, "files in it", LabelImages, tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
     LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=True)
     assert not list((tmp_path / "out" / "west").iterdir())
 
 
 def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="65536"):
-        LabelImages(tmp_path / "out", ["west"], 65536, PALETTE, overwrite=False)
-    with pytest.raises(OutputError, match="camera"):
-        LabelImages(tmp_path / "out", ["../west"], 3, PALETTE, overwrite=False)
+    refused(OutputError, "65536", LabelImages, tmp_path / "out", ["west"], 65536, PALETTE, overwrite=False)
+    refused(OutputError, "camera", LabelImages, tmp_path / "out", ["../west"], 3, PALETTE, overwrite=False)
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):
         LabelImages(tmp_path / "file" / "out", ["west"], 3, PALETTE, overwrite=False)

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from refusals import refused
 
 from stseg.arrays import Bytes
 from stseg.errors import SourceError
@@ -112,8 +113,7 @@ def test_masks_of_three_channels_have_no_colours(tmp_path: Path) -> None:
         cv2.imwrite(str(tmp_path / f"{name}.png"), picture)
         np.testing.assert_array_equal(read_picture(tmp_path / f"{name}.png", "masks", (8, 6), ""), mask)
     cv2.imwrite(str(tmp_path / "green.png"), np.dstack([0 * mask, mask, 0 * mask]))
-    with pytest.raises(SourceError, match="a picture in colours"):
-        read_picture(tmp_path / "green.png", "masks", (8, 6), "camera a")
+    refused(SourceError, "a picture in colours", read_picture, tmp_path / "green.png", "masks", (8, 6), "camera a")
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
@@ -136,8 +136,7 @@ def test_images_are_blue_green_red(tmp_path: Path, channels: int) -> None:
 )
 def test_pictures_of_another_kind_are_refused(tmp_path: Path, kind: SourceKind, picture: Bytes, reported: str) -> None:
     cv2.imwrite(str(tmp_path / "a.png"), picture)
-    with pytest.raises(SourceError, match=f"a.png: camera a: {reported}"):
-        read_picture(tmp_path / "a.png", kind, (3, 2), "camera a")
+    refused(SourceError, f"a.png: camera a: {reported}", read_picture, tmp_path / "a.png", kind, (3, 2), "camera a")
 
 
 @pytest.mark.parametrize("kind", ["images", "instances"])
@@ -145,8 +144,7 @@ def test_broken_files_are_refused(tmp_path: Path, kind: SourceKind) -> None:
     whole = png_by_hand(np.zeros((20, 30), np.uint8), 8, INDEXED)
     for data in (b"", b"no image", whole[:20], whole[:-30], whole[:24] + b"\x03" + whole[25:]):
         (tmp_path / "a.png").write_bytes(data)
-        with pytest.raises(SourceError, match="a broken file"):
-            read_picture(tmp_path / "a.png", kind, (30, 20), "")
+        refused(SourceError, "a broken file", read_picture, tmp_path / "a.png", kind, (30, 20), "")
 
 
 def names(folder: Path, *files: str) -> None:
@@ -182,12 +180,9 @@ def test_patterns_choose_files(tmp_path: Path) -> None:
 )
 def test_folders_without_a_clear_order_are_refused(tmp_path: Path, files: tuple[str, ...], reported: str) -> None:
     names(tmp_path, *files)
-    with pytest.raises(SourceError, match=reported):
-        image_paths(tmp_path, "camera a")
+    refused(SourceError, reported, image_paths, tmp_path, "camera a")
 
 
 def test_missing_folders_are_said(tmp_path: Path) -> None:
-    with pytest.raises(SourceError, match="no such file or folder"):
-        image_paths(tmp_path / "none", "camera a")
-    with pytest.raises(SourceError, match="no images"):
-        image_paths(tmp_path / "none_*.png", "camera a")
+    refused(SourceError, "no such file or folder", image_paths, tmp_path / "none", "camera a")
+    refused(SourceError, "no images", image_paths, tmp_path / "none_*.png", "camera a")

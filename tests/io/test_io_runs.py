@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 from run_files import (
     CONFIG,
     FRAMES,
@@ -110,11 +111,7 @@ def test_the_provenance_gives_back_the_rig_and_names_the_streams(run_path: Path)
 
 def test_viewers_find_their_attributes(run_path: Path) -> None:
     with h5py.File(run_path) as file:
-        assert (file.attrs["NX_class"], file.attrs["format"], file.attrs["default"]) == (
-            "NXroot",
-            "stseg-run",
-            "entry",
-        )
+        assert (file.attrs["NX_class"], file.attrs["format"], file.attrs["default"]) == ("NXroot", "stseg-run", "entry")
         group = file[file.attrs["default"]][file["entry"].attrs["default"]]
         assert group.attrs["NX_class"] == "NXdata"
         assert list(group.attrs["axes"]) == ["time", "plane", "y", "x"]
@@ -167,8 +164,7 @@ def test_a_run_of_no_frames_is_a_run(tmp_path: Path) -> None:
         writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
     run = read_run(tmp_path / "none.h5")
     assert len(run.frames) == len(run.trajectory) == len(run.tracks) == 0
-    with pytest.raises(ValueError, match="frame 3"):
-        run.read_frame(3)
+    refused(ValueError, "frame 3", run.read_frame, 3)
 
 
 def test_log_odds_are_kept_in_steps_and_finite(tmp_path: Path) -> None:
@@ -197,14 +193,10 @@ def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
     log_odds, label = small_volume(2)
     with writer_at(tmp_path / "slip.h5") as writer:
         writer.append_frames(np.array([4, 6]), log_odds, label)
-        with pytest.raises(ValueError, match="after frame 6"):
-            writer.append_frames(np.array([6, 7]), log_odds, label)
-        with pytest.raises(ValueError, match="volumes"):
-            writer.append_frames(np.array([8]), log_odds, label)
-        with pytest.raises(ValueError, match="labels of 3 frames for 2"):
-            writer.append_packed_labels([packed_frame(label[0])])
-        with pytest.raises(ValueError, match="rows"):
-            writer.append("ghosts", np.zeros(1, layout.ghost_type(3)))
+        refused(ValueError, "after frame 6", writer.append_frames, np.array([6, 7]), log_odds, label)
+        refused(ValueError, "volumes", writer.append_frames, np.array([8]), log_odds, label)
+        refused(ValueError, "labels of 3 frames for 2", writer.append_packed_labels, [packed_frame(label[0])])
+        refused(ValueError, "rows", writer.append, "ghosts", np.zeros(1, layout.ghost_type(3)))
     with pytest.raises(ValueError, match="views"):
         RunWriter(tmp_path / "slip.h5", small_recording(tmp_path), VIEWS[:2], CONFIG, overwrite=False)
 
@@ -217,8 +209,7 @@ def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
 
 def test_an_existing_file_is_refused_before_any_work(run_path: Path) -> None:
     before = run_path.read_bytes()
-    with pytest.raises(OutputError, match="exists"):
-        writer_at(run_path)
+    refused(OutputError, "exists", writer_at, run_path)
     assert run_path.read_bytes() == before
     assert not parts_of(run_path)
 
@@ -345,8 +336,7 @@ def test_a_file_that_appears_meanwhile_is_not_destroyed(tmp_path: Path) -> None:
 )
 def test_impossible_places_are_refused_before_any_work(tmp_path: Path, name: str, found: str) -> None:
     small_recording(tmp_path)
-    with pytest.raises(OutputError, match=found):
-        RunWriter(tmp_path / name, small_recording(tmp_path), VIEWS, CONFIG, overwrite=True)
+    refused(OutputError, found, RunWriter, tmp_path / name, small_recording(tmp_path), VIEWS, CONFIG, overwrite=True)
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -417,23 +407,19 @@ def test_text_outputs_replace_only_when_whole(tmp_path: Path) -> None:
 
 
 def test_what_is_no_run_file_is_told_by_name(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match="no such file"):
-        read_run(tmp_path / "none.h5")
+    refused(FormatError, "no such file", read_run, tmp_path / "none.h5")
     (tmp_path / "text.h5").write_text("frame,id,x,y\n")
-    with pytest.raises(FormatError, match="not HDF5"):
-        read_run(tmp_path / "text.h5")
+    refused(FormatError, "not HDF5", read_run, tmp_path / "text.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1
-    with pytest.raises(FormatError, match="/@format: found nothing"):
-        read_run(tmp_path / "other.h5")
+    refused(FormatError, "/@format: found nothing", read_run, tmp_path / "other.h5")
     with pytest.raises(FormatError):
         read_run(tmp_path)
 
 
 def test_a_cut_off_file_is_told(run_path: Path) -> None:
     run_path.write_bytes(run_path.read_bytes()[:-3000])
-    with pytest.raises(FormatError, match="whole run file"):
-        read_run(run_path)
+    refused(FormatError, "whole run file", read_run, run_path)
 
 
 def delete(name: str) -> Callable[[h5py.File], object]:

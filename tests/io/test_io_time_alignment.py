@@ -90,12 +90,7 @@ def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -
 
 @pytest.mark.parametrize(
     ("step", "expected"),
-    [
-        (0.5, [0, 2, 4, 6, 8, 10]),
-        (0.6, [0, 2, 3, 5, 7, 8]),
-        (1.5, [0, 1, 1, 2, 3, 3]),
-        (3.0, [0, 0, 1, 1, 1, 2]),
-    ],
+    [(0.5, [0, 2, 4, 6, 8, 10]), (0.6, [0, 2, 3, 5, 7, 8]), (1.5, [0, 1, 1, 2, 3, 3]), (3.0, [0, 0, 1, 1, 1, 2])],
 )
 def test_other_rates(step: float, expected: list[int]) -> None:
     assert nearest_frames(every(step, 40), step)[:6].tolist() == expected

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from stseg.errors import FormatError, OutputError
 from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
@@ -104,20 +105,15 @@ def test_ids_are_numbers_or_names(path: Path, ids: str, read: list[int]) -> None
 )
 def test_what_is_wrong_is_named_with_its_place(path: Path, text: str, message: str) -> None:
     path.write_text(text)
-    with pytest.raises(FormatError, match=f"tracks.csv: {message}"):
-        read_tracks_csv(path)
+    refused(FormatError, f"tracks.csv: {message}", read_tracks_csv, path)
 
 
 def test_files_that_are_no_text_are_refused(path: Path) -> None:
     path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
-    with pytest.raises(FormatError, match="not text"):
-        read_tracks_csv(path)
-    with pytest.raises(FormatError, match="No such file"):
-        read_tracks_csv(path.with_name("nowhere.csv"))
-    with pytest.raises(FormatError, match="directory"):
-        read_tracks_csv(path.parent)
+    refused(FormatError, "not text", read_tracks_csv, path)
+    refused(FormatError, "No such file", read_tracks_csv, path.with_name("nowhere.csv"))
+    refused(FormatError, "directory", read_tracks_csv, path.parent)
 
 
 def test_a_place_that_cannot_be_written_is_named(path: Path) -> None:
-    with pytest.raises(OutputError, match="nowhere"):
-        write_tracks_csv(path.parent / "nowhere" / "tracks.csv", trajectory([]))
+    refused(OutputError, "nowhere", write_tracks_csv, path.parent / "nowhere" / "tracks.csv", trajectory([]))

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from stseg.arrays import Rows
 from stseg.commands.main import main
@@ -149,8 +150,7 @@ def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     ],
 )
 def test_other_addresses_are_refused(address: str) -> None:
-    with pytest.raises(ConfigError, match=r"expected mqtt://HOST\[:PORT\]/TOPIC"):
-        receiver_of(address)
+    refused(ConfigError, r"expected mqtt://HOST\[:PORT\]/TOPIC", receiver_of, address)
 
 
 def test_publishing_needs_follow(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -211,8 +211,7 @@ def test_a_web_socket_that_breaks_is_opened_again() -> None:
         receiver.send(b"first")
         sent.set()
         assert closed.wait(10)
-        with pytest.raises(OSError, match="1000"):
-            receiver.send(b"second")
+        refused(OSError, "1000", receiver.send, b"second")
         receiver.send(b"second")
         wait_for(lambda: len(messages) == 2)
         receiver.close()
@@ -253,8 +252,7 @@ def test_a_web_server_that_is_none_of_sockets_is_one_line(
 
 def test_without_its_library_a_web_socket_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
-    with pytest.raises(ConfigError, match=r"pip install 'stseg\[websocket\]'"):
-        receiver_of("ws://127.0.0.1/")
+    refused(ConfigError, r"pip install 'stseg\[websocket\]'", receiver_of, "ws://127.0.0.1/")
 
 
 def test_rows_arrive_at_a_broker() -> None:

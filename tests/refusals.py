@@ -1,0 +1,17 @@
+"""Calls that must be refused with a message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ParamSpec
+
+import pytest
+
+P = ParamSpec("P")
+
+
+def refused(kind: type[Exception], match: str, call: Callable[P, object], *args: P.args, **kwargs: P.kwargs) -> str:
+    """The message of the error that a call raises, of a kind and like a regular expression."""
+    with pytest.raises(kind, match=match) as caught:
+        call(*args, **kwargs)
+    return str(caught.value)
