@@ -104,7 +104,7 @@ def gaussian(distance: float, var: float) -> float:
 
 
 def chromatic_densities(x: Floats, mu: Floats, across: float, along: float, darkest: float) -> tuple[float, float]:
-    """N and D of `stseg.foreground.background.chromatic`."""
+    """N and D of `stseg.foreground.background.mixture.Chromatic`."""
     ratio, off, length = polar(x, mu)
     disc = gaussian(off, across) / (2 * math.pi * across)
     lit = disc * gaussian((ratio - 1) * length, along) / math.sqrt(2 * math.pi * along)

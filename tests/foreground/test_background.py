@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 from stseg.arrays import Bytes, Singles
 from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
 from stseg.errors import ConfigError, SourceError
+from stseg.foreground import MODELS as MODELS_BY_NAME
 from stseg.foreground import Chromatic, Codebook, Mixture, make_background
 from stseg.foreground.background import codebook_kernels, gaussian_kernels
-from stseg.foreground.background.model import Background, PixelModel
-from stseg.foreground.background.registry import MODELS as MODELS_BY_NAME
+from stseg.foreground.background.codebook import forget_rare_words
+from stseg.foreground.background.codebook_kernels import Codewords
+from stseg.foreground.background.model import Background
+from stseg.foreground.background.posterior import Priors
 from stseg.kernels.accelerate import python_form
 
 FLOOR = (110, 140, 60)  # BGR
@@ -28,7 +31,7 @@ SIZE = (7, 6)
 MIDDLE = (3, 3)  # (v, u) of somebody who covers the pixels 2..4 x 2..4
 RATE = 4.0  # frames per second
 
-MODELS: dict[type[PixelModel], type[Any]] = {
+MODELS: dict[type[Background], type[Any]] = {
     Mixture: MixtureConfig,
     Chromatic: ChromaticConfig,
     Codebook: CodebookConfig,
@@ -51,7 +54,7 @@ def noisy(image: Bytes, rng: np.random.Generator, sd: float = 2.0) -> Bytes:
     return np.asarray(np.clip(np.round(image + rng.normal(0, sd, image.shape)), 0, 255), np.uint8)
 
 
-def taught(kind: type[PixelModel], **constants: float) -> PixelModel:
+def taught(kind: type[Background], **constants: float) -> Background:
     """A model that has seen twenty frames of the empty room."""
     model = new(kind, **constants)
     rng = np.random.default_rng(1)
@@ -60,7 +63,7 @@ def taught(kind: type[PixelModel], **constants: float) -> PixelModel:
     return model
 
 
-def new(kind: type[PixelModel], **constants: float) -> PixelModel:
+def new(kind: type[Background], **constants: float) -> Background:
     return kind(SIZE, RATE, MODELS[kind](**constants))
 
 
@@ -72,7 +75,7 @@ def in_shadow(share: float) -> tuple[float, float, float]:
 
 
 @every_model
-def test_the_likelihood_is_a_posterior_with_the_given_prior(kind: type[PixelModel]) -> None:
+def test_the_likelihood_is_a_posterior_with_the_given_prior(kind: type[Background]) -> None:
     model: Background = taught(kind, foreground_prior=0.2)
     assert model.prior == 0.2
     likelihood = model.likelihood(with_person(room()))
@@ -83,7 +86,7 @@ def test_the_likelihood_is_a_posterior_with_the_given_prior(kind: type[PixelMode
 
 
 @every_model
-def test_a_person_who_stands_for_a_minute_does_not_fade(kind: type[PixelModel]) -> None:
+def test_a_person_who_stands_for_a_minute_does_not_fade(kind: type[Background]) -> None:
     model, rng = taught(kind), np.random.default_rng(4)
     for _ in range(int(60 * RATE)):
         likelihood = model.likelihood(noisy(with_person(room()), rng))
@@ -92,7 +95,7 @@ def test_a_person_who_stands_for_a_minute_does_not_fade(kind: type[PixelModel]) 
 
 
 @every_model
-def test_a_shadow_stays_background_softly_and_teaches_nothing(kind: type[PixelModel]) -> None:
+def test_a_shadow_stays_background_softly_and_teaches_nothing(kind: type[Background]) -> None:
     model = taught(kind)
     for _ in range(60):
         likelihood = model.likelihood(with_person(room(), in_shadow(0.7)))
@@ -102,7 +105,7 @@ def test_a_shadow_stays_background_softly_and_teaches_nothing(kind: type[PixelMo
 
 
 @every_model
-def test_a_part_of_the_scene_may_change_slowly(kind: type[PixelModel]) -> None:
+def test_a_part_of_the_scene_may_change_slowly(kind: type[Background]) -> None:
     changed = (FLOOR[0] + 50, FLOOR[1], FLOOR[2] + 30)
     assert taught(kind).likelihood(with_person(room(), changed))[MIDDLE] > 0.9  # at once it is somebody
     model, rng = taught(kind, memory=10.0), np.random.default_rng(5)
@@ -114,7 +117,7 @@ def test_a_part_of_the_scene_may_change_slowly(kind: type[PixelModel]) -> None:
 
 
 @every_model
-def test_a_chair_becomes_background_after_the_absorption(kind: type[PixelModel]) -> None:
+def test_a_chair_becomes_background_after_the_absorption(kind: type[Background]) -> None:
     model, rng = taught(kind, absorption_time=20.0, smoothing_radius=0), np.random.default_rng(6)
     chair = with_person(room())
     answers = [float(model.likelihood(noisy(chair, rng))[MIDDLE]) for _ in range(int(24 * RATE))]
@@ -124,7 +127,7 @@ def test_a_chair_becomes_background_after_the_absorption(kind: type[PixelModel])
 
 
 @every_model
-def test_light_that_changes_at_once_is_no_person(kind: type[PixelModel]) -> None:
+def test_light_that_changes_at_once_is_no_person(kind: type[Background]) -> None:
     scene = np.random.default_rng(5).integers(40, 160, (24, 24, 3)).astype(np.uint8)
     model = kind((24, 24), RATE)  # type: ignore[call-arg]  # as models have it
     for _ in range(5):
@@ -136,7 +139,7 @@ def test_light_that_changes_at_once_is_no_person(kind: type[PixelModel]) -> None
 
 
 @every_model
-def test_flicker_shown_while_learning_is_background(kind: type[PixelModel]) -> None:
+def test_flicker_shown_while_learning_is_background(kind: type[Background]) -> None:
     model = new(kind)
     for k in range(20):
         model.learn(room() if k % 2 else room((200, 200, 200)))
@@ -145,7 +148,7 @@ def test_flicker_shown_while_learning_is_background(kind: type[PixelModel]) -> N
 
 
 @every_model
-def test_the_start_among_people_finds_what_is_behind_them(kind: type[PixelModel]) -> None:
+def test_the_start_among_people_finds_what_is_behind_them(kind: type[Background]) -> None:
     rng, frames = np.random.default_rng(3), []
     for k in range(20):  # 12 of 20 frames are covered, by people of many colours
         b, g, r = rng.integers(0, 256, 3)
@@ -158,7 +161,7 @@ def test_the_start_among_people_finds_what_is_behind_them(kind: type[PixelModel]
 
 
 @every_model
-def test_people_take_no_place_from_the_background(kind: type[PixelModel]) -> None:
+def test_people_take_no_place_from_the_background(kind: type[Background]) -> None:
     model, rng = taught(kind), np.random.default_rng(8)
     for _ in range(40):
         b, g, r = rng.integers(0, 256, 3)
@@ -168,7 +171,7 @@ def test_people_take_no_place_from_the_background(kind: type[PixelModel]) -> Non
 
 @every_model
 @pytest.mark.parametrize("level", [0, 255])
-def test_black_and_white_scenes_are_scenes_too(kind: type[PixelModel], level: int) -> None:
+def test_black_and_white_scenes_are_scenes_too(kind: type[Background], level: int) -> None:
     scenes = [room((level, level, level)) for _ in range(20)]
     learned, started = new(kind), new(kind)
     for scene in scenes:
@@ -181,7 +184,7 @@ def test_black_and_white_scenes_are_scenes_too(kind: type[PixelModel], level: in
 
 
 @every_model
-def test_a_copy_goes_on_bit_for_bit_and_by_itself(kind: type[PixelModel]) -> None:
+def test_a_copy_goes_on_bit_for_bit_and_by_itself(kind: type[Background]) -> None:
     rng = np.random.default_rng(7)
     frames = [noisy(with_person(room()) if k % 3 else room(), rng, 4.0) for k in range(24)]
     whole, first = taught(kind, absorption_time=3.0), taught(kind, absorption_time=3.0)
@@ -196,7 +199,7 @@ def test_a_copy_goes_on_bit_for_bit_and_by_itself(kind: type[PixelModel]) -> Non
 
 
 @every_model
-def test_what_a_model_cannot_take_is_refused(kind: type[PixelModel]) -> None:
+def test_what_a_model_cannot_take_is_refused(kind: type[Background]) -> None:
     with pytest.raises(SourceError, match="learned nothing"):
         new(kind).likelihood(room())
     with pytest.raises(SourceError, match="no frames"):
@@ -222,7 +225,7 @@ def test_the_configuration_names_the_model() -> None:
     codebook = make_background(SIZE, RATE, replace(config, model="codebook"))
     assert isinstance(codebook, Codebook)
     assert codebook.config.channel_sd == 7.0
-    assert isinstance(make_background(SIZE, RATE, config), PixelModel)
+    assert isinstance(make_background(SIZE, RATE, config), Background)
 
 
 @pytest.mark.parametrize(
@@ -298,9 +301,9 @@ def test_the_chromatic_log_odds_are_their_formula(seed: int, modes: int) -> None
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3)
     expected = reference.chromatic_log_odds(image, gain, *state, config)
     log_odds = np.empty(image.shape[:2], np.float32)
-    for function in (gaussian_kernels.evaluate, python_form(gaussian_kernels.evaluate)):
-        priors = gaussian_kernels.Priors.of(config)
-        function(image, gain.astype(np.float32), reference.planes_of(*state), priors, log_odds)
+    for function in (gaussian_kernels.fill_mixture_log_odds, python_form(gaussian_kernels.fill_mixture_log_odds)):
+        modes, weight = reference.planes_of(*state), config.background_weight
+        function(image, gain.astype(np.float32), modes, weight, Priors.of(config), log_odds)
         np.testing.assert_allclose(log_odds, expected, atol=2e-3)
 
 
@@ -314,7 +317,7 @@ def test_the_chromatic_modes_learn_by_their_rules(seed: int, modes: int) -> None
     expected = reference.chromatic_updated(image, gain.astype(float), likelihood, 0.05, 0.001, state, config)
     numbers = config.background_weight, config.match_distance, config.initial_sd, config.chromatic_sd, config.minimum_sd
     constants = gaussian_kernels.Adaptation(*(np.float32(number) for number in numbers))
-    for function in (gaussian_kernels.update, python_form(gaussian_kernels.update)):
+    for function in (gaussian_kernels.adapt_mixture, python_form(gaussian_kernels.adapt_mixture)):
         found = reference.planes_of(*state)
         function(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
         for one, other in zip(reference.modes_of(found), expected, strict=True):
@@ -369,11 +372,10 @@ def test_a_recurring_second_colour_is_background() -> None:
         assert (model.likelihood(with_person(room(), lamp))[MIDDLE] > 0.9) == likely
 
 
-Records = tuple[Singles, Singles, Singles, Singles, NDArray[np.int32]]
 NOW = 50
 
 
-def random_book(rng: np.random.Generator, words: int) -> Records:
+def random_book(rng: np.random.Generator, words: int) -> Codewords:
     shape = (3, 4, words)
     mean = rng.uniform(8, 240, (*shape, 3)).astype(np.float32)
     bounds = np.stack([rng.uniform(0.8, 1, shape), rng.uniform(1, 1.2, shape)], -1).astype(np.float32)
@@ -383,10 +385,10 @@ def random_book(rng: np.random.Generator, words: int) -> Records:
     weight[:, :, 0] = 7
     first = np.where(weight > 0, rng.integers(0, 2, shape) * 5, rng.integers(1, 40, shape))
     access = np.stack([first, rng.integers(first, NOW)], -1).astype(np.int32)
-    return mean, bounds, frequency, weight, access
+    return Codewords(mean, bounds, frequency, weight, access)
 
 
-def book_of(records: Records, longest: NDArray[np.int32], v: int, u: int) -> reference.Book:
+def book_of(records: Codewords, longest: NDArray[np.int32], v: int, u: int) -> reference.Book:
     """A pixel's codewords as the reference has them."""
     mean, bounds, frequency, weight, access = (part[v, u] for part in records)
     book: reference.Book = []
@@ -413,16 +415,13 @@ def assert_same_book(found: reference.Book, expected: reference.Book) -> None:
 @given(seed=st.integers(0, 10**6), words=st.integers(1, 3))
 def test_the_codebooks_log_odds_are_their_formula(seed: int, words: int) -> None:
     rng = np.random.default_rng(seed)
-    mean, bounds, _, weight, _ = random_book(rng, words)
-    image, gain, config = near_modes(rng, mean), rng.uniform(0.8, 1.25, 3), CodebookConfig()
-    expected = reference.codebook_log_odds(image, gain, mean, bounds, weight, config)
+    book = random_book(rng, words)
+    image, gain, config = near_modes(rng, book.mean), rng.uniform(0.8, 1.25, 3), CodebookConfig()
+    expected = reference.codebook_log_odds(image, gain, book.mean, book.bounds, book.weight, config)
+    tube = codebook_kernels.Tube(config.highlight_prior, config.brightest_highlight, config.channel_sd)
     log_odds = np.empty(image.shape[:2], np.float32)
-    for function in (codebook_kernels.evaluate, python_form(codebook_kernels.evaluate)):
-        function(
-            image, gain, mean, bounds, weight, config.foreground_prior, config.outlier_rate, config.shadow_prior,
-            config.highlight_prior, config.darkest_shadow, config.brightest_highlight, config.shadow_confusion,
-            config.channel_sd, log_odds,
-        )  # fmt: skip
+    for function in (codebook_kernels.fill_codebook_log_odds, python_form(codebook_kernels.fill_codebook_log_odds)):
+        function(image, gain.astype(np.float32), book, Priors.of(config), tube, log_odds)
         np.testing.assert_allclose(log_odds, expected, atol=5e-3)
 
 
@@ -435,7 +434,7 @@ def test_codewords_of_the_empty_scene_are_learned_by_their_rules(seed: int, word
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
     for function in (codebook_kernels.teach, python_form(codebook_kernels.teach)):
         found, runs = copies(state), longest.copy()
-        function(image, gain, NOW, np.float32(15), runs, *found)
+        function(image, gain, NOW, np.float32(15), runs, found)
         for v, u in np.ndindex(image.shape[:2]):
             book = book_of(state, longest, v, u)
             reference.teach(book, image[v, u].astype(float), gain.astype(float), NOW, 15)
@@ -452,7 +451,7 @@ def test_codewords_follow_the_scene_by_their_rules(seed: int, words: int) -> Non
     likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
     for function in (codebook_kernels.follow, python_form(codebook_kernels.follow)):
         found = copies(state)
-        function(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), 30, 12, *found)
+        function(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), (30, 12), found)
         for v, u in np.ndindex(image.shape[:2]):
             book = book_of(state, none, v, u)
             x, chance = image[v, u].astype(float), float(likelihood[v, u])
@@ -460,16 +459,16 @@ def test_codewords_follow_the_scene_by_their_rules(seed: int, words: int) -> Non
             assert_same_book(book_of(found, none, v, u), book)
 
 
-def copies(records: Records) -> Records:
-    mean, bounds, frequency, weight, access = records
-    return mean.copy(), bounds.copy(), frequency.copy(), weight.copy(), access.copy()
+def copies(records: Codewords) -> Codewords:
+    return Codewords(*(array.copy() for array in records))
 
 
 def test_a_negative_run_goes_on_from_the_end_to_the_beginning() -> None:
     longest = np.array([[[9, 2, 2, 5]]], np.int32)
     access = np.array([[[[1, 20], [3, 19], [4, 18], [1, 20]]]], np.int32)
     frequency, weight = np.ones((1, 1, 4), np.float32), np.ones((1, 1, 4), np.float32)
-    codebook_kernels.settle(20, 3, longest, frequency, weight, access)
+    mean, bounds = np.zeros((1, 1, 4, 3), np.float32), np.ones((1, 1, 4, 2), np.float32)
+    forget_rare_words(20, 3, longest, Codewords(mean, bounds, frequency, weight, access))
     np.testing.assert_array_equal(weight[0, 0], [1, 1, 0, 0])  # the first stays; 3, 5 and 5 away
     np.testing.assert_array_equal(frequency, weight)
     assert not access.any()

@@ -19,10 +19,15 @@ from stseg.arrays import Boxes, Bytes, Floats, Singles
 from stseg.bodies.box_likelihood import body
 from stseg.errors import InputError, SourceError, StsegError
 from stseg.foreground import Mixture, MixtureConfig, box_likelihood, instance_boxes, mask_likelihood
-from stseg.foreground.background.gaussian_kernels import Adaptation, Priors, evaluate, put_strongest_first, update
+from stseg.foreground.background.gaussian_kernels import (
+    Adaptation,
+    adapt_mixture,
+    fill_mixture_log_odds,
+    put_strongest_first,
+)
+from stseg.foreground.background.posterior import Priors, pool_log_odds
 from stseg.foreground.background.temporal_mode import commonest_colours
 from stseg.foreground.channel_gain import channel_gains, fill_gains
-from stseg.foreground.smoothing import pool_log_odds
 from stseg.kernels.accelerate import python_form
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
@@ -204,9 +209,9 @@ def test_evaluate_is_its_formula(seed: int, modes: int) -> None:
     image, gain, config = near_modes(rng, mean), rng.uniform(0.8, 1.25, 3), MixtureConfig()
     log_odds = np.empty(image.shape[:2], np.float32)
     expected = reference.log_odds(image, gain, mean, variance, weight, config)
-    for function in (evaluate, python_form(evaluate)):
+    for function in (fill_mixture_log_odds, python_form(fill_mixture_log_odds)):
         state = reference.planes_of(mean, variance, weight)
-        function(image, gain.astype(np.float32), state, Priors.of(config), log_odds)
+        function(image, gain.astype(np.float32), state, config.background_weight, Priors.of(config), log_odds)
         np.testing.assert_allclose(log_odds, expected, atol=2e-3)
 
 
@@ -221,7 +226,7 @@ def test_update_is_its_rules(seed: int, modes: int) -> None:
     expected = reference.updated(image, gain.astype(float), likelihood, 0.05, 0.001, state, config)
     numbers = config.background_weight, config.match_distance, config.initial_sd, config.minimum_sd, config.minimum_sd
     constants = Adaptation(*(np.float32(number) for number in numbers))
-    for function in (update, python_form(update)):
+    for function in (adapt_mixture, python_form(adapt_mixture)):
         found = reference.planes_of(*state)
         function(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
         for one, other in zip(reference.modes_of(found), expected, strict=True):
@@ -233,7 +238,9 @@ def test_rows_between_the_turns_stay_as_they_are() -> None:
     state = reference.planes_of(*random_modes(rng, 2))
     found, constants = state.copy(), Adaptation(*(np.float32(number) for number in (0.1, 5, 12, 4, 4)))
     image, likelihood = rng.integers(0, 256, (3, 4, 3)).astype(np.uint8), np.zeros((3, 4), np.float32)
-    update(image, np.ones(3, np.float32), likelihood, np.float32(0.05), np.float32(0.001), constants, 1, 4, found)
+    adapt_mixture(
+        image, np.ones(3, np.float32), likelihood, np.float32(0.05), np.float32(0.001), constants, 1, 4, found
+    )
     np.testing.assert_array_equal(found[:, :, [0, 2]], state[:, :, [0, 2]])
 
 

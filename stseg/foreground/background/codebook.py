@@ -38,79 +38,67 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import AnyArray, Bytes, Floats, Singles
+from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import CodebookConfig
-from stseg.foreground.background.codebook_kernels import evaluate, follow, settle, teach
-from stseg.foreground.background.model import TURNS, PixelModel
+from stseg.foreground.background.codebook_kernels import Codewords, Tube, fill_codebook_log_odds, follow, teach
+from stseg.foreground.background.model import TURNS, Background
 from stseg.foreground.background.temporal_mode import commonest_colours
 
 
-class Codebook(PixelModel):
-    """The background of one view, and the likelihood that its pixels show people.
-
-    State: mean float32 (v, u, K, 3), the colour v, grey levels BGR; bounds float32 (v, u, K, [low, high]), relative to
-    it; frequency float32 (v, u, K), turns; weight float32 (v, u, K), the frequency of background, at most that of the
-    memory, and 0 in the cache; access int32 (v, u, K, [first, last]), turns, first 0 for what was learned
-    before the first call of `likelihood`. A frequency of 0 is an empty place.
-    """
+class Codebook(Background):
+    """The background of one view, and the likelihood that its pixels show people."""
 
     name: ClassVar[str] = "codebook"
 
     def __init__(self, size: tuple[int, int], frame_rate: float, config: CodebookConfig | None = None) -> None:
-        self.config = CodebookConfig() if config is None else config
-        shape = (size[1], size[0], self.config.codewords)
-        arrays = {
-            "mean": np.zeros((*shape, 3), np.float32),
-            "bounds": np.ones((*shape, 2), np.float32),
-            "frequency": np.zeros(shape, np.float32),
-            "weight": np.zeros(shape, np.float32),
-            "access": np.zeros((*shape, 2), np.int32),
-        }
-        super().__init__(size, frame_rate, self.config)
-        self._arrays: dict[str, AnyArray] = arrays
+        self.config = config = CodebookConfig() if config is None else config
+        super().__init__(size, frame_rate, config)
+        self._words = Codewords.none((size[1], size[0], config.codewords))
+        self._tube = Tube(config.highlight_prior, config.brightest_highlight, config.channel_sd)
+        self._reach = config.match_distance * config.channel_sd
 
     def relight(self, gain: Singles) -> None:
         """Multiply all that was learned by gains float32 (v, u, 3), after a change of light."""
-        self._arrays["mean"] *= gain[:, :, None]
+        self._words.mean[:] *= gain[:, :, None]
 
     def _background_sample(self, step: int) -> Singles:
-        mean, weight = (self._arrays[name][::step, ::step] for name in ("mean", "weight"))
-        strongest = weight.argmax(-1)[:, :, None, None]
-        return np.asarray(np.take_along_axis(mean, strongest, 2)[:, :, 0])
+        strongest = self._words.weight[::step, ::step].argmax(-1)[:, :, None, None]
+        return np.asarray(np.take_along_axis(self._words.mean[::step, ::step], strongest, 2)[:, :, 0])
 
     def _start(self, frames: NDArray[np.uint8]) -> None:
-        for array in self._arrays.values():
-            array[:] = 0
-        mean, bounds, frequency, weight, access = self._arrays.values()
-        mean[:, :, 0], _ = commonest_colours(frames, self.config.match_distance * self.config.channel_sd)
-        bounds[:] = 1
-        frequency[:, :, 0] = weight[:, :, 0] = 1
-        longest = np.zeros(weight.shape, np.int32)
+        self._words = words = Codewords.none(self._words.weight.shape)
+        words.mean[:, :, 0], _ = commonest_colours(frames, self._reach)
+        words.frequency[:, :, 0] = words.weight[:, :, 0] = 1
+        longest = np.zeros(words.weight.shape, np.int32)
         for index, frame in enumerate(frames):
             self._learn(frame, np.ones(3), index + 1, longest)
-        settle(len(frames), round(self.config.recurrence * len(frames)), longest, frequency, weight, access)
+        forget_rare_words(len(frames), round(self.config.recurrence * len(frames)), longest, words)
 
     def _learn_empty(self, image: Bytes, gain: Floats) -> None:
-        self._learn(image, gain, 0, np.zeros(self._arrays["weight"].shape, np.int32))
+        self._learn(image, gain, 0, np.zeros(self._words.weight.shape, np.int32))
 
     def _learn(self, image: Bytes, gain: Floats, now: int, longest: NDArray[np.int32]) -> None:
-        reach = np.float32(self.config.match_distance * self.config.channel_sd)
-        mean, bounds, *records = self._arrays.values()
-        teach(image, gain.astype(np.float32), now, reach, longest, mean, bounds, *records)
+        teach(image, gain.astype(np.float32), now, np.float32(self._reach), longest, self._words)
 
     def _evaluate(self, image: Bytes, gain: Floats, log_odds: Singles) -> None:
-        config = self.config
-        evaluate(
-            image, gain, self._arrays["mean"], self._arrays["bounds"], self._arrays["weight"], config.foreground_prior,
-            config.outlier_rate, config.shadow_prior, config.highlight_prior, config.darkest_shadow,
-            config.brightest_highlight, config.shadow_confusion, config.channel_sd, log_odds,
-        )  # fmt: skip
+        fill_codebook_log_odds(image, gain.astype(np.float32), self._words, self._priors, self._tube, log_odds)
 
     def _update_rows(self, first: int, image: Bytes, gain: Floats, likelihood: Singles) -> None:
         config, turn, rows = self.config, self._turn, slice(first, None, TURNS)
-        follow(
-            image[rows], gain.astype(np.float32), likelihood[rows], self._frames_evaluated // TURNS + 1,
-            np.float32(config.match_distance * config.channel_sd), np.float32(1.0 - math.exp(-turn / config.memory)),
-            math.ceil(config.absorption_time / turn), math.ceil(config.absence / turn),
-            *(array[rows] for array in self._arrays.values()),
-        )  # fmt: skip
+        times = math.ceil(config.absorption_time / turn), math.ceil(config.absence / turn)
+        rate = np.float32(1.0 - math.exp(-turn / config.memory))
+        words = Codewords(*(array[rows] for array in self._words))
+        now = self._frames_evaluated // TURNS + 1
+        follow(image[rows], gain.astype(np.float32), likelihood[rows], now, np.float32(self._reach), rate, times, words)
+
+
+def forget_rare_words(frames: int, allowed: int, longest: NDArray[np.int32], words: Codewords) -> None:
+    """After initialisation among people, keep the first codewords and those with an allowed longest negative run.
+
+    A run goes on from the last frame to the first (Kim et al. 2005, section 2.1).
+    """
+    around = frames - words.access[..., 1] + words.access[..., 0] - 1
+    rare = np.maximum(longest, around) > allowed
+    rare[:, :, 0] = False
+    words.frequency[rare] = words.weight[rare] = 0
+    words.access[:] = 0

@@ -10,16 +10,16 @@ order is there in time. Pixels that need branches are treated one by one.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
 from stseg.arrays import Bytes, Labels, Singles
-from stseg.config import MixtureConfig
 from stseg.foreground.background.posterior import (
     EXPONENT_LIMIT,
     LOG_ODDS_LIMIT,
     UNIFORM_DENSITY,
+    Priors,
     bounded_log_odds,
     doubt_of,
 )
@@ -35,22 +35,6 @@ _UNIFORM, _EXPONENT_LIMIT = np.float32(UNIFORM_DENSITY), np.float32(EXPONENT_LIM
 _THIRD, _NEVER = np.float32(1 / 3), np.float32(np.inf)
 
 
-class Priors(NamedTuple):
-    """Constants of the posterior, of `stseg.config.MixtureConfig`."""
-
-    background_weight: float
-    foreground_prior: float
-    outlier_rate: float
-    shadow_prior: float
-    darkest_shadow: float
-    shadow_confusion: float
-
-    @classmethod
-    def of(cls, config: MixtureConfig) -> Self:
-        """Those of a configuration."""
-        return cls(*(float(getattr(config, name)) for name in cls._fields))
-
-
 class Adaptation(NamedTuple):
     """Constants of learning; standard deviations in grey levels."""
 
@@ -62,30 +46,27 @@ class Adaptation(NamedTuple):
 
 
 @wide_kernel
-def evaluate(image: Bytes, gain: Singles, modes: Singles, priors: Priors, log_odds: Singles) -> None:
-    """Fill `log_odds` (v, u) with the foreground log-odds; densities as in `stseg.foreground.background.chromatic`."""
+def fill_mixture_log_odds(
+    image: Bytes, gain: Singles, modes: Singles, background_weight: float, priors: Priors, log_odds: Singles
+) -> None:
+    """Fill `log_odds` (v, u) with the foreground log-odds; densities as in `mixture`."""
     rows, columns = log_odds.shape
     colour, margin = np.empty((3, columns), np.float32), np.empty(columns, np.float32)
     least = np.float32(-LOG_ODDS_LIMIT)
-    none = bounded_log_odds(
-        0.0, 0.0, priors.foreground_prior, priors.outlier_rate, priors.shadow_prior, priors.shadow_confusion
-    )
+    none = bounded_log_odds(0.0, 0.0, priors)
     for v in range(rows):
         _fill_colour(image[v], colour)
         row = log_odds[v]
-        _fill_margin(colour, gain, modes, v, priors, margin)
+        _fill_margin(colour, gain, modes, v, background_weight, priors, margin)
         for u in range(columns):
             row[u] = least
         for u in range(columns):
             if margin[u] > _ZERO:
                 continue
-            lit, dimmed = _densities(v, u, colour, gain, modes, priors)
+            lit, dimmed = _densities(v, u, colour, gain, modes, background_weight, priors)
             row[u] = none
             if lit + dimmed > _ZERO:
-                row[u] = bounded_log_odds(
-                    float(lit), float(dimmed), priors.foreground_prior, priors.outlier_rate, priors.shadow_prior,
-                    priors.shadow_confusion,
-                )  # fmt: skip
+                row[u] = bounded_log_odds(float(lit), float(dimmed), priors)
 
 
 @wide_kernel
@@ -102,7 +83,9 @@ def _fill_colour(row: Bytes, colour: Singles) -> None:
 
 
 @wide_kernel
-def _fill_margin(colour: Singles, gain: Singles, modes: Singles, v: int, priors: Priors, margin: Singles) -> None:
+def _fill_margin(
+    colour: Singles, gain: Singles, modes: Singles, v: int, background_weight: float, priors: Priors, margin: Singles
+) -> None:
     """Fill margin (u,) of row v: above 0 where the first mode alone puts the log-odds at their lower bound.
 
     A sufficient condition, found without exponentials and true of most pixels: exp(-z) >= (1 - z / 8)^8 bounds the
@@ -112,9 +95,9 @@ def _fill_margin(colour: Singles, gain: Singles, modes: Singles, v: int, priors:
     blue, green, red, spread = mode[0, v], mode[1, v], mode[2, v], mode[VARIANCE, v]
     lengthwise, weights = mode[planes - 2, v], mode[planes - 1, v]
     g0, g1, g2 = gain[0], gain[1], gain[2]
-    sure, reach = np.float32(1.0 - priors.background_weight), np.float32(1.0 - priors.darkest_shadow)
+    sure, reach = np.float32(1.0 - background_weight), np.float32(1.0 - priors.darkest_shadow)
     confusion = np.float32(priors.shadow_confusion)
-    doubt = np.float32(doubt_of(priors.foreground_prior, priors.outlier_rate, priors.shadow_prior))
+    doubt = np.float32(doubt_of(priors))
     for u in range(colour.shape[1]):
         m0, m1, m2 = g0 * blue[u], g1 * green[u], g2 * red[u]
         m0 = m0 if m0 < _WHITE else _WHITE
@@ -142,7 +125,7 @@ def _fill_margin(colour: Singles, gain: Singles, modes: Singles, v: int, priors:
 
 @part
 def _densities(
-    v: int, u: int, colour: Singles, gain: Singles, modes: Singles, priors: Priors
+    v: int, u: int, colour: Singles, gain: Singles, modes: Singles, background_weight: float, priors: Priors
 ) -> tuple[np.float32, np.float32]:
     """Densities of pixel (v, u)'s colour under the background modes: lit, and in shadow."""
     x0, x1, x2 = colour[0, u], colour[1, u], colour[2, u]
@@ -151,7 +134,7 @@ def _densities(
     lit, dimmed = _ZERO, _ZERO
     for k in range(modes.shape[0]):
         weight = modes[k, weight_plane, v, u]
-        if weight < priors.background_weight:
+        if weight < background_weight:
             continue
         m0 = min(gain[0] * modes[k, 0, v, u], _WHITE)
         m1 = min(gain[1] * modes[k, 1, v, u], _WHITE)
@@ -176,7 +159,7 @@ def _densities(
 
 
 @wide_kernel
-def update(
+def adapt_mixture(
     image: Bytes,
     gain: Singles,
     likelihood: Singles,

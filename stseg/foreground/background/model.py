@@ -1,4 +1,4 @@
-"""Background models: their protocol, and what the models of single pixels share.
+"""Background models: what all of them share.
 
 A background model belongs to one view. It learns the empty scene, then gives the foreground likelihood of each frame
 and adapts to the scene while it does.
@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from copy import copy
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,48 +20,15 @@ from numpy.typing import NDArray
 from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import BackgroundConfig
 from stseg.errors import ConfigError, SourceError
+from stseg.foreground.background.posterior import Priors, pool_log_odds
 from stseg.foreground.channel_gain import STRIDE, channel_gains
-from stseg.foreground.smoothing import pool_log_odds
 
 TURNS = 4
 """Each frame updates every fourth row at four times the rate: rates are slow, and it costs a quarter."""
 
 
-class Background(Protocol):
-    """A background model of one view. Deep copies are independent of each other."""
-
-    @property
-    def prior(self) -> float:
-        """Prior probability of a person at a pixel, included in the likelihood, 0..1."""
-        ...
-
-    def learn(self, image: Bytes) -> None:
-        """Learn a frame of the empty scene, uint8 (v, u, 3) BGR."""
-        ...
-
-    def learn_from(self, images: Iterable[Bytes]) -> None:
-        """Start anew from frames in which people walk, uint8 (v, u, 3) BGR each."""
-        ...
-
-    def likelihood(self, image: Bytes) -> Singles:
-        """Posterior foreground probability of each pixel, float32 (v, u) in (0, 1); then the model learns the frame."""
-        ...
-
-    def background_image(self) -> Singles:
-        """Strongest background mode of each pixel, (v, u, 3), grey levels in the light that it was learned in."""
-        ...
-
-    def relight(self, gain: Singles) -> None:
-        """Multiply all that was learned by gains float32 (v, u, 3), after a change of light."""
-        ...
-
-    def at_rate(self, frame_rate: float) -> Self:
-        """The same model for another frame rate, frames per second; shares its arrays, so use only one of the two."""
-        ...
-
-
-class PixelModel(ABC):
-    """Base of the models that treat pixels one by one: gain, pooling, update turns. Implements `Background`.
+class Background(ABC):
+    """A background model of one view: gain, pooling, update turns. Deep copies are independent of each other.
 
     Parameters
     ----------
@@ -85,7 +52,7 @@ class PixelModel(ABC):
             raise ConfigError(self.name, "frame_rate", frame_rate, "frames per second, above 0")
         self._shape = (size[1], size[0], 3)
         self._turn = TURNS / frame_rate
-        self._config = config
+        self._config, self._priors = config, Priors.of(config)
         self._frames_learned = 0
         self._frames_evaluated = 0
 

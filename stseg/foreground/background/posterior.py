@@ -1,4 +1,4 @@
-"""Foreground log-odds of a colour from its densities, common to all background models.
+"""Foreground log-odds of a colour from its densities, and their pooling over neighbours: common to all models.
 
 With densities per cubed grey level, `lit` of the background as it was learned, `dimmed` of it in shadow, and U of a
 colour of which nothing is known (symbols as in `stseg.foreground.background.mixture`),
@@ -9,10 +9,13 @@ colour of which nothing is known (symbols as in `stseg.foreground.background.mix
 from __future__ import annotations
 
 import math
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.kernels.accelerate import kernel
+from stseg.arrays import Singles
+from stseg.config import BackgroundConfig
+from stseg.kernels.accelerate import kernel, wide_kernel
 
 UNIFORM_DENSITY = 1.0 / 256.0**3  # density of an unknown colour, per cubed grey level
 LOG_ODDS_LIMIT = 5.0  # nats; beyond it one pixel would outvote all its neighbours
@@ -23,11 +26,25 @@ _UNIFORM = np.float32(UNIFORM_DENSITY)
 _ZERO, _ONE, _TWO, _SIXTEENTH = np.float32(0), np.float32(1), np.float32(2), np.float32(1 / 16)
 
 
+class Priors(NamedTuple):
+    """Constants of the posterior that all models share, of `stseg.config.BackgroundConfig`."""
+
+    foreground_prior: float
+    outlier_rate: float
+    shadow_prior: float
+    darkest_shadow: float
+    shadow_confusion: float
+
+    @classmethod
+    def of(cls, config: BackgroundConfig) -> Self:
+        """Those of a configuration."""
+        return cls(*(float(getattr(config, name)) for name in cls._fields))
+
+
 @kernel
-def bounded_log_odds(
-    lit: float, dimmed: float, foreground: float, unexplained: float, shadow: float, mimicry: float
-) -> float:
+def bounded_log_odds(lit: float, dimmed: float, priors: Priors) -> float:
     """The log-odds of a person, nats, within 5."""
+    foreground, unexplained, shadow, _, mimicry = priors
     person = (1.0 - mimicry) * UNIFORM_DENSITY + mimicry * dimmed
     scene = (1.0 - unexplained) * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * UNIFORM_DENSITY
     ratio = foreground * person / ((1.0 - foreground) * scene)
@@ -37,8 +54,9 @@ def bounded_log_odds(
 
 
 @kernel
-def doubt_of(foreground: float, unexplained: float, shadow: float) -> float:
+def doubt_of(priors: Priors) -> float:
     """Ratio of the densities of background and people from which on the log-odds are at their lower bound."""
+    foreground, unexplained, shadow, _, _ = priors
     lit_share = (1.0 - unexplained) * (1.0 - shadow)
     return _ROUNDING * foreground * math.exp(LOG_ODDS_LIMIT) / ((1.0 - foreground) * lit_share)
 
@@ -71,3 +89,65 @@ def outshines(
     closeness, level = closeness * closeness, level * level
     person = _UNIFORM * area * line * level + _TWO * mimicry * weight * closeness
     return bool(doubt * span * person < weight * closeness * level * line)
+
+
+_NEAR_BOUND = np.float32(1e-5 - LOG_ODDS_LIMIT)  # means of certain background are the bound but for rounding
+
+
+@wide_kernel
+def pool_log_odds(log_odds: Singles, radius: int, likelihood: Singles) -> None:
+    """Mean of the log-odds around each pixel, as a probability.
+
+    Neighbours mostly show the same thing, so a mean of log-odds (the geometric mean of the odds) removes single noisy
+    pixels and blurs borders by `radius` alone. Along each axis the weight falls linearly from the pixel itself, to 0
+    beyond `radius`. At the image's border the mean is over the pixels that exist.
+
+    Parameters
+    ----------
+    log_odds : float32 (v, u)
+        Nats, no less than -LOG_ODDS_LIMIT.
+    radius
+        Pixels; 0 for no smoothing.
+    likelihood : float32 (v, u)
+        Filled with 1 / (1 + exp(-mean)).
+    """
+    height, width = log_odds.shape
+    down, mean, share = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    lowest = np.float32(1.0 / (1.0 + math.exp(LOG_ODDS_LIMIT)))
+    for u in range(width):
+        share[u] = np.float32(1.0 / _weight_within(u, width, radius))
+    for v in range(height):
+        scale = np.float32(1.0 / _weight_within(v, height, radius))
+        down[:] = np.float32(0)
+        for k in range(max(0, v - radius), min(height, v + radius + 1)):
+            _add(scale * np.float32(radius + 1 - abs(k - v)), log_odds[k], down)
+        for u in range(width):
+            mean[u] = np.float32(radius + 1) * down[u]
+        for shift in range(1, radius + 1):
+            weight = np.float32(radius + 1 - shift)
+            _add(weight, down[shift:], mean[: width - shift])
+            _add(weight, down[: width - shift], mean[shift:])
+        for u in range(width):
+            mean[u] *= share[u]
+            likelihood[v, u] = lowest
+        last, value = np.float32(np.nan), lowest
+        for u in range(width):
+            if mean[u] > _NEAR_BOUND:  # few are, and of those that nothing explains all are the same
+                if mean[u] != last:
+                    last = mean[u]
+                    value = np.float32(1) / (np.float32(1) + np.exp(-last))
+                likelihood[v, u] = value
+
+
+@wide_kernel
+def _add(weight: np.float32, values: Singles, total: Singles) -> None:
+    """Add weighted values to total, both (u,): without arithmetic on places it becomes vector code."""
+    for u in range(len(total)):
+        total[u] += weight * values[u]
+
+
+@wide_kernel
+def _weight_within(place: int, extent: int, radius: int) -> float:
+    """Sum of the weights around a place of those of `extent` places that exist."""
+    before, after = max(radius - place, 0), max(radius - (extent - 1 - place), 0)
+    return (radius + 1) ** 2 - (before * (before + 1) + after * (after + 1)) / 2
