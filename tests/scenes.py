@@ -7,17 +7,17 @@ rows of x, y and height in metres, float64 (n, 3).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import cv2
 import numpy as np
 from reference_track_filter import best_pairs
 
-from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
+from stseg.arrays import Boxes, Bytes, Floats, Rows, Singles
 from stseg.bodies.pillars import PROFILE, SILHOUETTE
 from stseg.config import BodyConfig, Config, DetectionConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.io.recording.frames import FrameSet
 from stseg.records.people import People
 from stseg.records.predicted_tracks import PredictedTracks, no_tracks
 from stseg.records.sizes import Sizes
@@ -33,15 +33,6 @@ BODY = BodyConfig(heights=(1.6, 1.7, 1.8))
 CONFIG = Config(body=BODY, detection=FEW_HEIGHTS)
 _FINE = 4
 _BITS = 6
-
-
-@dataclass(frozen=True)
-class Moment:
-    """What all cameras saw at one time."""
-
-    frame: int
-    views: tuple[Observation, ...]
-    images: tuple[Observation, ...] = ()
 
 
 def looking(
@@ -202,15 +193,15 @@ def standing_at(truth: Rows, frame: int) -> Floats:
     return np.column_stack([own["x"], own["y"], own["height"].astype(float)])
 
 
-def mask_moments(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[Moment]:
+def mask_frame_sets(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[FrameSet]:
     """Frames first .. stop - 1 as masks of all cameras."""
     for frame in range(first, stop):
         standing = standing_at(truth, frame)
-        yield Moment(frame, tuple(mask(camera, standing) for camera in rig.cameras))
+        yield FrameSet(frame, tuple(mask(camera, standing) for camera in rig.cameras))
 
 
-def box_moments(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[Moment]:
+def box_frame_sets(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[FrameSet]:
     """Frames first .. stop - 1 as boxes of all cameras."""
     for frame in range(first, stop):
         standing = standing_at(truth, frame)
-        yield Moment(frame, tuple(boxes(camera, standing) for camera in rig.cameras))
+        yield FrameSet(frame, tuple(boxes(camera, standing) for camera in rig.cameras))

@@ -1,5 +1,8 @@
 """Foreground likelihood of one view: soft maps, never thresholded (docs/how-it-works.md, Foreground)."""
 
+from collections.abc import Callable
+from typing import Any
+
 from stseg.bodies.box_likelihood import box_likelihood
 from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
 from stseg.foreground.background.codebook import Codebook
@@ -24,7 +27,11 @@ __all__ = [
     "mask_likelihood",
 ]
 
-MODELS = {"mixture": Mixture, "chromatic": Chromatic, "codebook": Codebook}
+MODELS: dict[str, Callable[[tuple[int, int], float, Any], Background]] = {
+    "mixture": Mixture,
+    "chromatic": Chromatic,
+    "codebook": Codebook,
+}
 """Every model that `foreground.model` may name; its constants have the same name in the configuration."""
 
 

@@ -12,12 +12,12 @@ from scenes import (
     BODY,
     CONFIG,
     FEW_HEIGHTS,
-    box_moments,
+    box_frame_sets,
     boxes,
     corner_cameras,
     expecting,
     likelihoods,
-    mask_moments,
+    mask_frame_sets,
     no_boxes,
     people,
     rig_of,
@@ -137,7 +137,7 @@ def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Asked) -> None:
     rig, truth = room(), walkers(2)
-    moments = list((box_moments if kind == "boxes" else mask_moments)(rig, truth, 0, 2))
+    moments = list((box_frame_sets if kind == "boxes" else mask_frame_sets)(rig, truth, 0, 2))
     config = replace(CONFIG, proposals=replace(FEW, source=asked))
     pipeline = Pipeline(rig, [kind] * 4, config, "frames")
     rows = np.concatenate(

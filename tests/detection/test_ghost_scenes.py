@@ -12,7 +12,6 @@ from scenes import (
     BODY,
     CONFIG,
     FEW_HEIGHTS,
-    Moment,
     boxes,
     corner_cameras,
     expecting,
@@ -34,6 +33,7 @@ from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
+from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
 from stseg.records.tables import Tracks
 from stseg.tracking.filter.assignment import assign, distances
@@ -137,7 +137,7 @@ def moving_ghosts(kind: str) -> Run:
     rig = facing_pair()
     pipeline = Pipeline(rig, [kind] * 2, CONFIG, "cut")
     moments = [
-        Moment(f, tuple((mask if kind == "pixels" else boxes)(camera, strollers(f)) for camera in rig.cameras))
+        FrameSet(f, tuple((mask if kind == "pixels" else boxes)(camera, strollers(f)) for camera in rig.cameras))
         for f in range(FRAMES)
     ]
     steps = list(run_session(pipeline, [ViewForeground()] * 2, moments, 0, lambda _: None))

@@ -9,7 +9,7 @@ from itertools import chain, repeat
 
 import numpy as np
 import pytest
-from scenes import CONFIG, Moment, box_moments, mask_moments, room, walkers
+from scenes import CONFIG, box_frame_sets, mask_frame_sets, room, walkers
 
 from stseg.arrays import Boxes, Ints, Labels, Rows
 from stseg.detection.score.scoring import set_score
@@ -19,6 +19,7 @@ from stseg.engine.session import run_session
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
+from stseg.io.recording.frames import FrameSet
 from stseg.kernels.accelerate import python_form
 from stseg.records.tables import CANDIDATE, RATES, TIMING, Tracks
 
@@ -27,11 +28,14 @@ INTERPRETED = python_form(set_score) is set_score
 FRAMES, MASKED, BLIND = (12, 7, 7) if INTERPRETED else (40, 17, 17)
 RIG = room()
 TRUTH = walkers(40)
-MOMENTS: dict[str, Callable[[Rig, Rows, int, int], Iterator[Moment]]] = {"pixels": mask_moments, "boxes": box_moments}
+MOMENTS: dict[str, Callable[[Rig, Rows, int, int], Iterator[FrameSet]]] = {
+    "pixels": mask_frame_sets,
+    "boxes": box_frame_sets,
+}
 
 
 @cache
-def recording(kind: str, stop: int) -> tuple[Moment, ...]:
+def recording(kind: str, stop: int) -> tuple[FrameSet, ...]:
     return tuple(MOMENTS[kind](RIG, TRUTH, 0, stop))
 
 
@@ -60,7 +64,7 @@ def foregrounds() -> list[ViewForeground]:
 
 
 def run(
-    kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0, cores: Iterable[int] = repeat(2)
+    kind: str, moments: Iterable[FrameSet], tracker: str = "cut", first: int = 0, cores: Iterable[int] = repeat(2)
 ) -> Run:
     pipeline = Pipeline(RIG, [kind] * len(RIG.cameras), CONFIG, tracker)
     advanced: list[int] = []
@@ -184,7 +188,7 @@ def test_one_core_alone_or_at_first_gives_the_same(kind: str, alone: int) -> Non
 def test_moments_may_come_in_chunks() -> None:
     """A generator that reads ahead, a list, one by one: the result is the same."""
 
-    def chunks(size: int) -> Iterator[Moment]:
+    def chunks(size: int) -> Iterator[FrameSet]:
         read = recording("boxes", FRAMES)
         for start in range(0, FRAMES, size):
             yield from list(read[start : start + size])
@@ -253,7 +257,7 @@ def test_a_camera_that_goes_blind() -> None:
     """One of four cameras stops in the middle: nobody is lost."""
     half = BLIND // 2
     moments = [
-        moment if moment.frame < half else Moment(moment.frame, (*moment.views[:3], None))
+        moment if moment.frame < half else FrameSet(moment.frame, (*moment.views[:3], None))
         for moment in recording("boxes", BLIND)
     ]
     done = run("boxes", moments)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import run_files
 from recordings import FRAMES, assert_same, write_recording
-from scenes import box_moments, corner_cameras, rig_of, walkers
+from scenes import box_frame_sets, corner_cameras, rig_of, walkers
 
 import stseg
 from stseg.arrays import Boxes
@@ -61,7 +61,7 @@ def test_errors_are_those_of_the_command(rig_path: Path, arguments: Mapping[str,
 def test_boxes_in_memory_are_tracked_as_those_of_files(rig_path: Path) -> None:
     recording = stseg.read_recording(rig_path)
     tracker, results = stseg.Tracker(recording.rig), []
-    for frame_set in box_moments(recording.rig, walkers(20), 0, 20):
+    for frame_set in box_frame_sets(recording.rig, walkers(20), 0, 20):
         boxes = [view for view in frame_set.views if isinstance(view, Boxes)]
         results += tracker.add([np.column_stack([view.pixel, view.score]) for view in boxes])
     results += tracker.finish()

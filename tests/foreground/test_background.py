@@ -302,8 +302,8 @@ def test_the_chromatic_log_odds_are_their_formula(seed: int, modes: int) -> None
     expected = reference.chromatic_log_odds(image, gain, *state, config)
     log_odds = np.empty(image.shape[:2], np.float32)
     for function in (gaussian_kernels.fill_mixture_log_odds, python_form(gaussian_kernels.fill_mixture_log_odds)):
-        modes, weight = reference.planes_of(*state), config.background_weight
-        function(image, gain.astype(np.float32), modes, weight, Priors.of(config), log_odds)
+        state_of_modes, weight = reference.planes_of(*state), config.background_weight
+        function(image, gain.astype(np.float32), state_of_modes, weight, Priors.of(config), log_odds)
         np.testing.assert_allclose(log_odds, expected, atol=2e-3)
 
 
@@ -433,7 +433,7 @@ def test_codewords_of_the_empty_scene_are_learned_by_their_rules(seed: int, word
     longest = rng.integers(0, 20, state[2].shape).astype(np.int32)
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
     for function in (codebook_kernels.teach, python_form(codebook_kernels.teach)):
-        found, runs = copies(state), longest.copy()
+        found, runs = deepcopy(state), longest.copy()
         function(image, gain, NOW, np.float32(15), runs, found)
         for v, u in np.ndindex(image.shape[:2]):
             book = book_of(state, longest, v, u)
@@ -450,17 +450,13 @@ def test_codewords_follow_the_scene_by_their_rules(seed: int, words: int) -> Non
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
     likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
     for function in (codebook_kernels.follow, python_form(codebook_kernels.follow)):
-        found = copies(state)
+        found = deepcopy(state)
         function(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), (30, 12), found)
         for v, u in np.ndindex(image.shape[:2]):
             book = book_of(state, none, v, u)
             x, chance = image[v, u].astype(float), float(likelihood[v, u])
             reference.follow(book, x, gain.astype(float), chance, NOW, 15, 0.06, (30, 12))
             assert_same_book(book_of(found, none, v, u), book)
-
-
-def copies(records: Codewords) -> Codewords:
-    return Codewords(*(array.copy() for array in records))
 
 
 def test_a_negative_run_goes_on_from_the_end_to_the_beginning() -> None:

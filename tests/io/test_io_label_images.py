@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from refusals import refused
-from scenes import Moment, box_moments, looking, mask_moments, rig_of, standing_at, walkers
+from scenes import box_frame_sets, looking, mask_frame_sets, rig_of, standing_at, walkers
 
 from stseg.arrays import Boxes, Bytes, Rows
 from stseg.commands.main import main
@@ -16,6 +16,7 @@ from stseg.config import LabelConfig
 from stseg.errors import OutputError
 from stseg.geometry import Rig
 from stseg.io.outputs.label_images import LabelImages
+from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.streams import open_images
 from stseg.io.runfile.runs import RunWriter
@@ -40,7 +41,7 @@ def write_run(path: Path, sources: tuple[CameraSource, ...], tracks: Rows, confi
     return path
 
 
-def mask_sources(folder: Path, frame_sets: list[Moment], instances: bool = False) -> tuple[CameraSource, ...]:
+def mask_sources(folder: Path, frame_sets: list[FrameSet], instances: bool = False) -> tuple[CameraSource, ...]:
     sources = []
     for k, camera in enumerate(two_cameras().cameras):
         own = folder / f"{camera.name}_seen"
@@ -64,7 +65,7 @@ def read(folder: Path, camera: str) -> list[Bytes]:
 
 @pytest.fixture
 def run_path(tmp_path: Path) -> Path:
-    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
     return write_run(tmp_path / "run.h5", mask_sources(tmp_path, frame_sets), walkers(FRAMES))
 
 
@@ -128,7 +129,7 @@ def test_frames_keep_their_numbers_and_their_labels(run_path: Path, tmp_path: Pa
 
 
 def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> None:
-    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
     folder = tmp_path / "instances"
     folder.mkdir()
     path = write_run(folder / "run.h5", mask_sources(folder, frame_sets, instances=True), walkers(FRAMES))
@@ -141,7 +142,7 @@ def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> N
 
 
 def test_boxes_have_no_label_images_and_blind_views_no_labels(tmp_path: Path) -> None:
-    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
     masks, _ = mask_sources(tmp_path, frame_sets[:2])
     masks = CameraSource(masks.source, on_missing="blind")
     path = write_run(tmp_path / "run.h5", (masks, box_source(tmp_path / "east.csv")), walkers(FRAMES))
@@ -153,7 +154,7 @@ def test_boxes_have_no_label_images_and_blind_views_no_labels(tmp_path: Path) ->
 
 def box_source(path: Path) -> CameraSource:
     lines = ["frame,left,top,width,height"]
-    for frame_set in box_moments(two_cameras(), walkers(FRAMES), 0, FRAMES):
+    for frame_set in box_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES):
         found = frame_set.views[1]
         assert isinstance(found, Boxes)
         lines += [f"{frame_set.frame},{','.join(map(str, box))}" for box in found.pixel.tolist()]
@@ -175,7 +176,7 @@ def test_what_the_user_can_mend_is_said(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
-    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
     sources = mask_sources(tmp_path, frame_sets)
     wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nposition_noise = 0.5\n")
     plain = write_run(tmp_path / "plain.h5", sources, walkers(FRAMES))

@@ -8,7 +8,6 @@ from itertools import combinations, islice, pairwise
 
 import numpy as np
 import pytest
-from scenes import Moment
 
 from stseg.arrays import Bytes, Flags
 from stseg.config import Config, TrackingConfig
@@ -18,6 +17,7 @@ from stseg.engine.session import run_session
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.io.recording.frames import FrameSet
 from stseg.kernels.accelerate import python_form
 from stseg.records.tables import APPEARANCE
 from stseg.simulation import NAMED, Route, SceneFilm, SceneSpec
@@ -126,9 +126,9 @@ def switches(name: str, kind: str, stop: int) -> int:
     rig, film = SceneFilm(NAMED[name]).rig, filmed(name, stop)
     pipeline = Pipeline(rig, [kind] * len(rig.cameras), Config(), "cut")
     if kind == "boxes":
-        moments = [Moment(seen.frame, tuple(view.boxes for view in seen.views)) for seen in film]
+        moments = [FrameSet(seen.frame, tuple(view.boxes for view in seen.views)) for seen in film]
     else:
-        moments = [Moment(seen.frame, tuple(silhouette(view.instances > 0) for view in seen.views)) for seen in film]
+        moments = [FrameSet(seen.frame, tuple(silhouette(view.instances > 0) for view in seen.views)) for seen in film]
     done: list[int] = []
     commits = [
         step.commit for step in run_session(pipeline, [ViewForeground() for _ in rig.cameras], moments, 0, done.append)

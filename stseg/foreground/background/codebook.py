@@ -87,7 +87,7 @@ class Codebook(Background):
         config, turn, rows = self.config, self._turn, slice(first, None, TURNS)
         times = math.ceil(config.absorption_time / turn), math.ceil(config.absence / turn)
         rate = np.float32(1.0 - math.exp(-turn / config.memory))
-        words = Codewords(*(array[rows] for array in self._words))
+        words = self._words.rows(rows)
         now = self._frames_evaluated // TURNS + 1
         follow(image[rows], gain.astype(np.float32), likelihood[rows], now, np.float32(self._reach), rate, times, words)
 

@@ -54,6 +54,11 @@ class Codewords(NamedTuple):
         frequency, weight = np.zeros((2, *shape), np.float32)
         return cls(mean, bounds, frequency, weight, np.zeros((*shape, 2), np.int32))
 
+    def rows(self, rows: slice) -> Codewords:
+        """Those of some rows, as views of the arrays."""
+        mean, bounds, frequency, weight, access = self
+        return Codewords(mean[rows], bounds[rows], frequency[rows], weight[rows], access[rows])
+
 
 class Tube(NamedTuple):
     """Constants of a codeword's density, of `stseg.config.CodebookConfig`."""
