@@ -8,7 +8,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from scenes import box_moments, looking, rig_of, walkers
+from scenes import box_frame_sets, looking, rig_of, walkers
 
 from stseg.arrays import Boxes
 from stseg.commands.main import main
@@ -28,7 +28,7 @@ def write_recording(folder: Path) -> Path:
     places = {"west": (-3.5, -3.5, 2.6), "east": (3.5, -3.4, 2.6), "north": (0.0, 3.6, 2.6)}
     rig = rig_of([looking(name, place) for name, place in places.items()])
     lines = {name: ["frame,left,top,width,height"] for name in places}
-    for moment in box_moments(rig, walkers(FRAMES), 0, FRAMES):
+    for moment in box_frame_sets(rig, walkers(FRAMES), 0, FRAMES):
         for name, view in zip(places, moment.views, strict=True):
             assert isinstance(view, Boxes)
             lines[name] += [f"{moment.frame},{','.join(map(repr, row))}" for row in view.pixel.tolist()]
