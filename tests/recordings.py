@@ -8,18 +8,21 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 from scenes import box_frame_sets, looking, rig_of, walkers
 
 from stseg.arrays import Boxes
 from stseg.commands.main import main
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
+from stseg.kernels.accelerate import COMPILED
 
 FRAMES = 40
 OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "detection.lattice_spacing=0.25")
 """Segments of six frames."""
 ALONE = ("--workers", "1")
 """In this process alone."""
+compiled_only = pytest.mark.skipif(not COMPILED, reason="too slow without a compiler")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
 

@@ -15,14 +15,11 @@ from pathlib import Path
 
 import pytest
 from fault_driver import Driver
-from recordings import assert_same, write_recording
-
-from stseg.detection.score.scoring import set_score
-from stseg.kernels.accelerate import python_form
+from recordings import assert_same, compiled_only, write_recording
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="needs /proc"),
-    pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler"),
+    compiled_only,
 ]
 
 

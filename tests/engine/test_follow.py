@@ -15,13 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arrivals import FRAMES, PLACES, StandIn, arrive, filmed_rig, films, meanwhile, write_pieces, write_video
-from recordings import ENVIRONMENT, assert_same
+from recordings import ENVIRONMENT, assert_same, compiled_only
 from scenes import walkers
 
 import stseg.engine.live.following
 from stseg.arrays import Rows
 from stseg.commands.main import main
-from stseg.detection.score.scoring import set_score
 from stseg.engine.live.following import ENDLESS, last_frame
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
@@ -30,7 +29,6 @@ from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.kernels.accelerate import python_form
 from stseg.records.tables import CORRECTION, TRAJECTORY
 from stseg.trajectories.live_corrections import LiveCorrections, corrected
 from stseg.trajectories.live_ids import LiveIds
@@ -62,7 +60,6 @@ OPTIONS = tuple(
     for word in ("--set", constant)
 )
 """Segments of twelve frames; backgrounds that hold for sixteen; tracks that are final with their window."""
-quick = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
 
 def track(rig: Path, output: Path, *more: str) -> int:
@@ -118,7 +115,7 @@ def afterwards(rig: Path, live: Path, tmp_path_factory: pytest.TempPathFactory) 
     return output
 
 
-@quick
+@compiled_only
 def test_what_is_followed_ends_as_what_is_run_afterwards(live: Path, afterwards: Path) -> None:
     assert_same(live, afterwards)
     scores = evaluate(walkers(FRAMES), read_run(live).trajectory)
@@ -126,7 +123,7 @@ def test_what_is_followed_ends_as_what_is_run_afterwards(live: Path, afterwards:
     assert sorted(path.name for path in live.parent.iterdir()) == ["run.h5", "run.h5.live.csv"]
 
 
-@quick
+@compiled_only
 def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> None:
     messages = read_tracks_csv(live.with_name("run.h5.live.csv"))
     assert np.unique(messages["frame"]).tolist() == list(range(FRAMES))
@@ -135,7 +132,7 @@ def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> Non
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
 
 
-@quick
+@compiled_only
 def test_ids_that_are_corrected_go_on_so_and_are_told(
     rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -163,7 +160,7 @@ def test_ids_that_are_corrected_go_on_so_and_are_told(
     assert_same(output, live)
 
 
-@quick
+@compiled_only
 def test_the_run_file_keeps_every_line_of_the_live_table(live: Path) -> None:
     """By frame and place, so that final ids are found for what was told under provisional ones."""
     told, kept = read_tracks_csv(live.with_name("run.h5.live.csv")), read_run(live).committed
@@ -173,7 +170,7 @@ def test_the_run_file_keeps_every_line_of_the_live_table(live: Path) -> None:
         np.testing.assert_allclose(told[name], kept[name], atol=6e-4, rtol=0)
 
 
-@quick
+@compiled_only
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
@@ -206,7 +203,7 @@ def test_a_run_to_which_nothing_came_leaves_nothing(tmp_path: Path) -> None:
     assert list(output.parent.iterdir()) == []
 
 
-@quick
+@compiled_only
 def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2)
@@ -221,7 +218,7 @@ def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
     assert not output.exists()
 
 
-@quick
+@compiled_only
 def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, tmp_path: Path) -> None:
     assert live.exists()
     output = tmp_path / "run.h5"
@@ -237,7 +234,7 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
     assert (evaluate(walkers(FRAMES), messages).switches, len(messages)) == (0, 3 * FRAMES)
 
 
-@quick
+@compiled_only
 def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)
@@ -267,7 +264,7 @@ def _as_live(rig: Path, path: Path, addresses: dict[str, str]) -> Path:
     return path
 
 
-@quick
+@compiled_only
 def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
     cameras_rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -326,7 +323,7 @@ def server(cameras_rig: Path) -> Iterator[dict[str, str]]:
 
 
 @pytest.mark.slow
-@quick
+@compiled_only
 def test_a_real_rtsp_server_whose_streams_end_is_followed(
     cameras_rig: Path, server: dict[str, str], tmp_path: Path
 ) -> None:

@@ -16,21 +16,18 @@ from typing import Any
 import h5py
 import pytest
 from attacks import write_rig
-from recordings import ALONE, ENVIRONMENT, OPTIONS, assert_same, track, write_recording
+from recordings import ALONE, ENVIRONMENT, OPTIONS, assert_same, compiled_only, track, write_recording
 from run_files import write_small_run
 
 from stseg.commands.main import main
-from stseg.detection.score.scoring import set_score
 from stseg.io.outputs.whole_files import create_part, replacing
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.reading.run_reader import read_run
 from stseg.io.runfile.unfinished import part_file
 from stseg.io.untrusted.values import printable
-from stseg.kernels.accelerate import python_form
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")
-COMPILED = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 YEAR = 3e7
 COMMAND = "import sys; from stseg.commands.main import command; command()"
 AS_NOBODY = """
@@ -57,7 +54,7 @@ def lines_of(program: str, *arguments: object, **environment: str) -> tuple[int,
     return done.returncode, done.stderr.splitlines()
 
 
-@COMPILED
+@compiled_only
 @LINUX
 def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / os.fsdecode(b"caf\xe9:1")
@@ -76,7 +73,7 @@ def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFix
     ]
 
 
-@COMPILED
+@compiled_only
 @pytest.mark.parametrize("code", [errno.ENOLCK, errno.ENOSYS])
 def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
     rig = write_recording(tmp_path)
@@ -172,7 +169,7 @@ def test_parts_of_a_later_clock_are_removed(tmp_path: Path) -> None:
     assert [part.exists() for part in parts] == [False, True, False]
 
 
-@COMPILED
+@compiled_only
 def test_a_clock_set_back_before_a_resume_changes_nothing(tmp_path: Path) -> None:
     (tmp_path / "whole").mkdir()
     rig, night = write_recording(tmp_path), tmp_path / "night.h5"

@@ -12,7 +12,6 @@ import pytest
 from scenes import CONFIG, box_frame_sets, mask_frame_sets, room, walkers
 
 from stseg.arrays import Boxes, Ints, Labels, Rows
-from stseg.detection.score.scoring import set_score
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
@@ -20,10 +19,10 @@ from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
 from stseg.io.recording.frames import FrameSet
-from stseg.kernels.accelerate import python_form
+from stseg.kernels.accelerate import COMPILED
 from stseg.records.tables import CANDIDATE, RATES, TIMING, Tracks
 
-INTERPRETED = python_form(set_score) is set_score
+INTERPRETED = not COMPILED
 """Without its compiler the recording must be shorter: a frame takes a hundred times as long."""
 FRAMES, MASKED, BLIND = (12, 7, 7) if INTERPRETED else (40, 17, 17)
 RIG = room()

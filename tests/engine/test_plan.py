@@ -6,14 +6,12 @@ import json
 from pathlib import Path
 
 import pytest
-from recordings import FRAMES, OPTIONS, track, write_recording
+from recordings import FRAMES, OPTIONS, compiled_only, track, write_recording
 
 from stseg.commands.main import main
-from stseg.detection.score.scoring import set_score
-from stseg.kernels.accelerate import python_form
 from stseg.tasks.forecast import Forecast
 
-pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+pytestmark = compiled_only
 
 
 @pytest.fixture(scope="module")

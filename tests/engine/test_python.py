@@ -10,15 +10,12 @@ import h5py
 import numpy as np
 import pytest
 import run_files
-from recordings import FRAMES, assert_same, write_recording
+from recordings import FRAMES, assert_same, compiled_only, write_recording
 from scenes import box_frame_sets, corner_cameras, rig_of, walkers
 
 import stseg
 from stseg.arrays import Boxes
-from stseg.detection.score.scoring import set_score
-from stseg.kernels.accelerate import python_form
 
-COMPILED = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 RIG = rig_of(corner_cameras())
 
 
@@ -27,7 +24,7 @@ def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_recording(tmp_path_factory.mktemp("recording"))
 
 
-@COMPILED
+@compiled_only
 def test_track_does_what_the_command_does(rig_path: Path, tmp_path: Path) -> None:
     from stseg.commands.main import main
 
@@ -40,7 +37,7 @@ def test_track_does_what_the_command_does(rig_path: Path, tmp_path: Path) -> Non
         stseg.track(rig_path, tmp_path / "a.h5", frames=(0, 20))
 
 
-@COMPILED
+@compiled_only
 def test_a_run_without_an_output_goes_with_its_object(rig_path: Path) -> None:
     run = stseg.track(str(rig_path), frames=(None, 10), tracker="frames", volume="none")
     path = run.path
@@ -57,7 +54,7 @@ def test_errors_are_those_of_the_command(rig_path: Path, arguments: Mapping[str,
         stseg.track(rig_path, **arguments)
 
 
-@COMPILED
+@compiled_only
 def test_boxes_in_memory_are_tracked_as_those_of_files(rig_path: Path) -> None:
     recording = stseg.read_recording(rig_path)
     tracker, results = stseg.Tracker(recording.rig), []
@@ -74,7 +71,7 @@ def test_boxes_in_memory_are_tracked_as_those_of_files(rig_path: Path) -> None:
     assert sum(len(result.detections) for result in results) == len(run.detections)
 
 
-@COMPILED
+@compiled_only
 def test_a_likelihood_is_a_mask_in_other_numbers() -> None:
     mask = np.zeros((len(RIG.cameras), *RIG.cameras[0].size[::-1]), np.uint8)
     mask[:, 20:60, 50:70] = 255
@@ -86,7 +83,7 @@ def test_a_likelihood_is_a_mask_in_other_numbers() -> None:
     np.testing.assert_array_equal(volumes[0], volumes[1])
 
 
-@COMPILED
+@compiled_only
 def test_frames_that_are_left_out_are_blind() -> None:
     tracker = stseg.Tracker(RIG, tracker="frames")
     boxes = np.zeros((0, 4))
@@ -114,7 +111,7 @@ def test_an_observation_that_does_not_suit_is_one_line(views: Any, complaint: st
         stseg.Tracker(RIG).add(views)
 
 
-@COMPILED
+@compiled_only
 def test_a_camera_keeps_to_its_kind() -> None:
     tracker = stseg.Tracker(RIG, tracker="frames")
     tracker.add([Boxes(np.zeros((0, 4)), np.zeros(0)), None, None, None])

@@ -13,14 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import ALONE, ENVIRONMENT, FRAMES, OPTIONS, assert_same, track, write_recording
+from recordings import ALONE, ENVIRONMENT, FRAMES, OPTIONS, assert_same, compiled_only, track, write_recording
 from scenes import walkers
 
-from stseg.detection.score.scoring import set_score
 from stseg.evaluation import evaluate
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_files import checksum
-from stseg.kernels.accelerate import python_form
 
 PROGRAM = """
 import signal, sys, time
@@ -32,7 +30,7 @@ SegmentWriter.keep = lambda writer: (time.sleep(0.5), keep(writer))[1]
 sys.exit(main())
 """
 """A run on a slow disk, that it is still at work when a signal reaches it on a machine of any speed."""
-pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+pytestmark = compiled_only
 
 
 @pytest.fixture(scope="module")

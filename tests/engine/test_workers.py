@@ -15,12 +15,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from recordings import ENVIRONMENT, assert_same, track, write_recording
+from recordings import ENVIRONMENT, assert_same, compiled_only, track, write_recording
 
-from stseg.detection.score.scoring import set_score
-from stseg.kernels.accelerate import python_form
-
-pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+pytestmark = compiled_only
 
 
 @pytest.fixture(scope="module")

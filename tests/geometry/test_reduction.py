@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from recordings import compiled_only
 from scenes import looking
 from strategies import BARREL, numbers
 
 from stseg.commands.main import main
-from stseg.detection.score.scoring import set_score
 from stseg.geometry import Grid, Rig
 from stseg.geometry.rig import greatest_reduction
 from stseg.io.recording.frames import open_frames, read_background
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
-from stseg.kernels.accelerate import python_form
 
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
 
@@ -74,7 +73,7 @@ def test_frames_are_means_of_squares_and_masks_stay(tmp_path: Path) -> None:
     np.testing.assert_array_equal(masks, picture[:, :, 0])
 
 
-@pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+@compiled_only
 def test_boxes_of_a_run_are_in_the_pixels_of_the_images(tmp_path: Path) -> None:
     film = ["simulate", str(tmp_path / "film"), "--scene", "demo", "--seconds", "1.5", "--size", "320,240"]
     assert main(film) == 0

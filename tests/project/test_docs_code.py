@@ -9,11 +9,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from recordings import track, write_recording
+from recordings import compiled_only, track, write_recording
 
 from stseg.commands.main import _app
-from stseg.detection.score.scoring import set_score
-from stseg.kernels.accelerate import python_form
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -53,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-@pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+@compiled_only
 @pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=lambda page: page.name)
 def test_python_blocks_run(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)

@@ -11,14 +11,13 @@ import pytest
 
 from stseg.arrays import Bytes, Flags
 from stseg.config import Config, TrackingConfig
-from stseg.detection.score.scoring import set_score
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import FrameSet
-from stseg.kernels.accelerate import python_form
+from stseg.kernels.accelerate import COMPILED
 from stseg.records.tables import APPEARANCE
 from stseg.simulation import NAMED, Route, SceneFilm, SceneSpec
 from stseg.simulation.crowd.script import walk_routes
@@ -26,7 +25,7 @@ from stseg.simulation.film import RenderedFrame as Filmed
 from stseg.tracking.windows.windows import windows
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
-INTERPRETED = python_form(set_score) is set_score
+INTERPRETED = not COMPILED
 
 
 def standing(heights: tuple[float, ...] = (1.7,)) -> SceneSpec:

@@ -7,21 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import track, write_recording
+from recordings import compiled_only, track, write_recording
 from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, people, room
 
 from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.detection.score.scoring import set_score
 from stseg.geometry import Camera, Rig
 from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.runfile.runs import read_run
-from stseg.kernels.accelerate import python_form
 from stseg.tasks.overview import summarise_run
 from stseg.view_health.knock_detection import find_residual_step, views_off
 
 CELL = 0.1
-slow = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
 
 def moved(rig: Rig, view: int, pixels: float) -> Rig:
@@ -96,7 +93,7 @@ def test_a_knock_is_found_with_its_window(side: int) -> None:
     assert knock.after - knock.before == pytest.approx(side * 0.15, abs=0.04)
 
 
-@slow
+@compiled_only
 def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_recording(tmp_path)
     recording = read_recording(path)
