@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from reference_track_filter import best_pairs
+from reference_core import best_pairs
 
 from stseg.arrays import Boxes, Bytes, Floats, Rows, Singles
 from stseg.bodies.pillars import PROFILE, SILHOUETTE

@@ -1,15 +1,28 @@
-"""Rigs beyond all bounds (findings F4, F5, F7 and F8) are refused in one line; large ones work."""
+"""Rig files, calibrations and recordings from strangers: a result, or one line that names the file."""
 
 from __future__ import annotations
 
+import json
+import os
+import struct
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
-from attacks import RIG, refusal, write_rig
+from attacks import RIG, film, refusal, write_rig
 
+from stseg.errors import InputError, SourceError
+from stseg.io.calibrations.matlab_file import parse_mat
+from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.source_files import source_parts
+from stseg.io.recording.video.ffmpeg import read_video_size
+from stseg.io.recording.video.packets import PictureHeads
+from stseg.io.untrusted.numpy_files import parse_npy
 
 
 @pytest.mark.parametrize(
@@ -99,3 +112,196 @@ def test_hundreds_of_thousands_of_points_are_refused(
         capsys, *("calibrate", "points", tmp_path / "p.csv", "-o", tmp_path / "r.toml", "--area=0,0,1,1"),
         *("--frame-rate", "5", "--size", "64,48"),
     )  # fmt: skip
+
+
+# Calibrations
+
+
+def mat_file(name: bytes = b"P", rows: int = 3, columns: int = 4, size: int | None = None) -> bytes:
+    values = np.arange(12, dtype="<f8").tobytes()
+    flags = struct.pack("<IIII", 6, 8, 6, 0)
+    sizes = struct.pack("<IIii", 5, 8, rows, columns)
+    title = struct.pack("<HH4s", 1, len(name), name.ljust(4, b"\0"))
+    body = flags + sizes + title + struct.pack("<II", 9, len(values)) + values
+    return b"MATLAB".ljust(124) + b"\0\1IM" + struct.pack("<II", 14, len(body) if size is None else size) + body
+
+
+def test_matlab_matrices_are_read_by_columns() -> None:
+    np.testing.assert_array_equal(parse_mat(mat_file())["P"], np.arange(12.0).reshape(4, 3).T)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_mutated_matlab_file_is_refused_or_read(seed: int) -> None:
+    random, data = np.random.default_rng(seed), bytearray(mat_file())
+    for place in random.integers(128, len(data), 8):
+        data[place] = random.integers(256)
+    try:
+        matrices = parse_mat(bytes(data))
+    except ValueError as error:
+        assert "\n" not in str(error)
+    else:
+        assert all(matrix.ndim == 2 for matrix in matrices.values())
+
+
+def test_a_matlab_file_that_declares_more_than_it_has_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"where .* are left"):
+        parse_mat(mat_file(size=2**31))
+    assert parse_mat(mat_file(rows=2**20, columns=2**20)) == {}
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000, 1000000), }",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (3, ",
+        "{'descr': '|O', 'fortran_order': False, 'shape': (3, 4), }",
+        "{'descr': '<b8', 'fortran_order': False, 'shape': (3, 4), }",
+        "(" * 200,
+    ],
+)
+def test_numpy_headers_are_not_believed(header: str) -> None:
+    data = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + b"\0" * 96
+    with pytest.raises(ValueError, match="header"):
+        parse_npy(data)
+
+
+def test_a_small_archive_that_unpacks_to_gigabytes_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.npy", bytes(200_000_000))
+    said = refusal(
+        capsys, *("calibrate", "import", "matrix", tmp_path / "a.npz", "-o", tmp_path / "r.toml"),
+        *("--area=0,0,1,1", "--frame-rate", "5", "--size", "64,48", "--names", "a"),
+    )  # fmt: skip
+    assert "unpacked" in said
+
+
+NVIDIA = {
+    "sensors": [
+        {
+            "id": "c",
+            "cameraMatrix": np.eye(3, 4).tolist(),
+            "attributes": [{"name": "frameWidth", "value": "9" * 5000}, {"name": "frameHeight", "value": "9"}],
+        }
+    ]
+}
+
+
+@pytest.mark.parametrize(
+    ("format", "suffix", "text"),
+    [
+        ("nvidia", ".json", json.dumps(NVIDIA)),
+        ("nvidia", ".json", json.dumps(NVIDIA).replace('"c"', "[[1]]")),
+        ("nvidia", ".json", json.dumps(NVIDIA).replace('"frameWidth"', "[1]")),
+        ("krt", ".json", json.dumps({"": {"K": [1.0] * 9, "RT": [1.0] * 12}})),
+        ("krt", ".json", "[" * 100_000),
+        ("anipose", ".toml", '[cam_0]\nname = "a"\nsize = [64, 48]\nmatrix = [[1e308,0,1],[0,1,1],[0,0,1]]\n'
+         "distortions = [0]\nrotation = [1e308, 1e308, 0]\ntranslation = [1, 1, 1]\n"),
+        ("tsai", ".xml", '<Camera name="a"><Geometry width="1" height="1" dpx="1e-300" dpy="1e-300"/>'
+         '<Intrinsic focal="1e9" kappa1="1e9" cx="1" cy="1" sx="1"/>'
+         '<Extrinsic tx="0" ty="0" tz="0" rx="0" ry="0" rz="0"/></Camera>'),
+        ("matrix", ".txt", "1e999 " * 12),
+    ],
+)  # fmt: skip
+def test_calibrations_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], format: str, suffix: str, text: str
+) -> None:
+    (tmp_path / f"a{suffix}").write_text(text)
+    refusal(
+        capsys, *("calibrate", "import", format, tmp_path / f"a{suffix}", "-o", tmp_path / "rig.toml"),
+        *("--area=0,0,1,1", "--frame-rate", "5", "--unit", "m", "--up=+z"),
+    )  # fmt: skip
+    assert not (tmp_path / "rig.toml").exists()
+
+
+# Recordings
+
+
+@pytest.mark.parametrize("name", ["2026-01-01T10:30:00.avi", "http:127.0.0.1:9701", "concat:a", "-", "a%03d.avi"])
+def test_any_name_of_a_file_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    film(tmp_path / name, tmp_path / "plain.avi")
+    monkeypatch.chdir(tmp_path)
+    assert read_video_size(Path(name)) == (64, 48)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs file names of any bytes")
+def test_paths_that_are_no_utf8_work(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe"))
+    folder.mkdir()
+    film(folder / "a.avi", tmp_path / "plain.avi")
+    assert read_video_size(folder / "a.avi") == (64, 48)
+    assert read_recording(write_rig(folder)).rig.name == "yard"
+
+
+@pytest.mark.parametrize(
+    "text", ["#EXTM3U\n#EXTINF:1,\nhttp://127.0.0.1:9/a.ts\n", "ffconcat version 1.0\nfile a.avi\n"]
+)
+def test_playlists_are_no_videos(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.avi").write_text(text)
+    with pytest.raises(InputError, match="playlist"):
+        read_video_size(tmp_path / "a.avi")
+
+
+def test_pipes_are_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = write_rig(tmp_path)
+    (tmp_path / "boxes.csv").unlink()
+    os.mkfifo(tmp_path / "boxes.csv")
+    refusal(capsys, "run", rig, "-o", tmp_path / "q.h5")
+
+
+def test_ffmpeg_is_told_to_open_files_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    film(tmp_path / "a.avi", tmp_path / "plain.avi")
+    seen: list[str | None] = []
+
+    def open_capture(address: str, backend: int) -> cv2.VideoCapture:
+        seen.append(os.environ.get("OPENCV_FFMPEG_CAPTURE_OPTIONS"))
+        return plain(address, backend)
+
+    plain = cv2.VideoCapture
+    monkeypatch.setattr(cv2, "VideoCapture", open_capture)
+    monkeypatch.setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;http")
+    assert read_video_size(tmp_path / "a.avi") == (64, 48)
+    assert seen == ["protocol_whitelist;file"]
+    assert os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] == "protocol_whitelist;http"
+
+
+def test_damaged_pictures_are_answered_in_one_line(tmp_path: Path) -> None:
+    """libjpeg and libpng write to standard error by themselves."""
+    picture = np.random.default_rng(0).integers(0, 256, (480, 640, 3), np.uint8)
+    for suffix in (".jpg", ".png"):
+        data = bytearray(cv2.imencode(suffix, picture)[1])
+        data[len(data) // 2 : len(data) // 2 + 3000] = bytes(3000)
+        (tmp_path / f"a{suffix}").write_bytes(data[:-2000])
+        program = "import sys; from stseg.commands.main import main; sys.exit(main())"
+        done = subprocess.run(
+            [sys.executable, "-c", program, "calibrate", "page", f"a{suffix}", "-o", "p.html", "--overwrite"],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+            env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
+        )  # fmt: skip
+        assert done.returncode in (0, 2)
+        assert done.stderr.count("\n") == (done.returncode == 2), done.stderr
+
+
+def test_a_png_chunk_longer_than_its_file_is_not_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenCV would take two gigabytes for it."""
+    data = bytearray(cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
+    start = data.index(b"IDAT") - 4
+    data[start : start + 4] = b"\x7f\xff\xff\xff"
+    (tmp_path / "a.png").write_bytes(data)
+    monkeypatch.setattr(cv2, "imdecode", decoded_nothing)
+    with pytest.raises(SourceError, match="a broken file"):
+        read_picture(tmp_path / "a.png", "images", (64, 48), "")
+
+
+def test_a_packet_that_declares_a_huge_picture_is_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+    packet = bytearray(cv2.imencode(".jpg", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
+    start = packet.index(b"\xff\xc0") + 5
+    assert PictureHeads().fits(np.frombuffer(packet, np.uint8))
+    packet[start : start + 4] = (16000).to_bytes(2, "big") + (65500).to_bytes(2, "big")
+    monkeypatch.setattr(cv2, "imdecode", decoded_nothing)
+    assert not PictureHeads().fits(np.frombuffer(packet, np.uint8))
+
+
+def decoded_nothing(*_: object) -> None:
+    raise AssertionError("it was decoded")

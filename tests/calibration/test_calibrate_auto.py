@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from walking import Walking, changed, delayed, walking
+from simulated_people import Walking, changed, delayed, walking
 
 from stseg.arrays import Floats, Singles
 from stseg.calibration.adjusted_rig import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled

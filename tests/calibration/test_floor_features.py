@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from walking import Walking, walking
+from simulated_people import Walking, walking
 
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import cameras_of

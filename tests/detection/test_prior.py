@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import reference_track_filter as reference
+import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import AREA, corner_cameras, expecting, looking, rig_of

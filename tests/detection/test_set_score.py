@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import reference_core as reference
 from crafted_frames import PARAMETERS, hiders_of_cover, in_rooms, random_frame, scaled, two_births
-from reference_track_filter import best_pairs
+from reference_core import best_pairs
 from scipy.optimize import linear_sum_assignment
 
 from stseg.bodies.outlines import paint

@@ -1,20 +1,26 @@
-"""The whole way on a micro recording: three walkers, four cameras, masks and boxes without any noise."""
+"""The pipeline from observations to tracks, and images beside boxes."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, repeat
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import CONFIG, box_frame_sets, mask_frame_sets, room, walkers
 
+import stseg
 from stseg.arrays import Boxes, Ints, Labels, Rows
+from stseg.commands.simulate import simulate
+from stseg.config import Config, TrackingConfig
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
+from stseg.errors import SourceError
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
@@ -262,3 +268,40 @@ def test_a_camera_that_goes_blind() -> None:
     done = run("boxes", moments)
     scores = evaluate(TRUTH[TRUTH["frame"] < BLIND], done.tracks.trajectory)
     assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
+
+
+# Images beside boxes
+
+
+CAMERAS, IMAGE_FRAMES = 3, 12
+NOTHING = Config(tracking=TrackingConfig(appearance="none"))
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scene") / "room"
+    simulate(folder, scene="demo", people=3, cameras=CAMERAS, seconds=IMAGE_FRAMES / 10, frame_rate=10.0)
+    text = (folder / "rig_boxes.toml").read_text()
+    images = r'\1\nimages = { kind = "video", path = "\2.avi" }'
+    beside = re.sub(r'^(source = .*"(cam\d)_boxes.*)$', images, text, flags=re.MULTILINE)
+    assert beside.count("images =") == CAMERAS
+    (folder / "beside.toml").write_text(beside)
+    return folder
+
+
+def test_a_run_keeps_the_colours_of_people(scene: Path, tmp_path: Path) -> None:
+    run = stseg.track(scene / "beside.toml", tmp_path / "run.h5", volume="none")
+    colours = run.appearance["colours"]
+    assert len(colours) > 2 * IMAGE_FRAMES
+    assert np.isfinite(colours).all()
+    assert {"images"} <= {name.decode() for name in run.provenance.sources["role"]}
+
+
+def test_frames_that_nobody_wants_are_not_read(scene: Path, tmp_path: Path) -> None:
+    gone = tmp_path / "gone.toml"
+    text = (scene / "beside.toml").read_text().replace('path = "cam', f'path = "{scene}/cam')
+    gone.write_text(re.sub(r'images = .*"', f'images = {{ kind = "video", path = "{tmp_path}/none.avi"', text))
+    run = stseg.track(gone, tmp_path / "run.h5", config=NOTHING, volume="none")
+    assert not len(run.appearance)
+    with pytest.raises(SourceError, match=r"none\.avi"):
+        stseg.track(gone, tmp_path / "other.h5", volume="none")

@@ -1,20 +1,31 @@
-"""The front door in Python: `track`, `Tracker`, rigs from arrays, and what a run gives."""
+"""The Python interface: public names, calls that are commands, and plans."""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numba
 import numpy as np
 import pytest
 import run_files
-from recordings import FRAMES, assert_same, compiled_only, write_recording
+from recordings import FRAMES, OPTIONS, assert_same, compiled_only, track, write_recording
+from run_files import write_small_run
 from scenes import box_frame_sets, corner_cameras, rig_of, walkers
 
 import stseg
 from stseg.arrays import Boxes
+from stseg.commands.main import main
+from stseg.engine.offline.calls import called_beside, called_here
+from stseg.errors import ConfigError
+from stseg.kernels.accelerate import COMPILED
+from stseg.tasks.forecast import Forecast
 
 RIG = rig_of(corner_cameras())
 
@@ -140,3 +151,152 @@ def test_the_volume_is_read_as_it_is_indexed(tmp_path: Path) -> None:
     with h5py.File(run.path) as file:
         np.testing.assert_array_equal(run.volume.label[1:3, 0], file["/entry/occupancy/label"][1:3, 0])
     np.testing.assert_array_equal(run.volume_dataset().label.values, np.asarray(run.volume.label))
+
+
+# Public names
+
+
+def test_every_public_name_is_there() -> None:
+    assert {*stseg.__all__, "__version__"} == set(dir(stseg))
+    for name in stseg.__all__:
+        assert getattr(stseg, name).__name__ == name
+
+
+@pytest.fixture(scope="module")
+def instances(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    """One large instance of each public class."""
+    rig = rig_of(corner_cameras())
+    run = stseg.read_run(write_small_run(tmp_path_factory.mktemp("run") / "run.h5"))
+    tracker = stseg.Tracker(rig, tracker="frames")
+    corners = np.random.default_rng(0).uniform(-1, 1, (50, 2))
+    boxes = stseg.Boxes(np.ones((90, 4)), np.ones(90))
+    (committed,) = [*tracker.add([np.zeros((0, 4))] * 4), *tracker.finish()]
+    return {
+        "Boxes": boxes,
+        "Camera": rig.cameras[0],
+        "CommittedFrames": committed,
+        "Config": stseg.Config(),
+        "FrameSet": stseg.FrameSet(3, (boxes, None)),
+        "Grid": stseg.Grid((-1.0, 1.0), (-1.0, 1.0), polygon=corners),
+        "InputError": stseg.InputError("rig.toml", "key", 1, "2"),
+        "Lens": stseg.Lens(np.eye(3), np.zeros(8)),
+        "Recording": run.recording,
+        "Rig": rig,
+        "Run": run,
+        "Scores": stseg.evaluate(run.trajectory, run.trajectory),
+        "Source": run.recording.sources[0].source,
+        "StsegError": stseg.StsegError("words"),
+        "Tracker": tracker,
+    }
+
+
+@pytest.mark.parametrize("name", stseg.__all__)
+def test_a_public_object_shows_itself_in_ten_lines(name: str, instances: dict[str, object]) -> None:
+    public = getattr(stseg, name)
+    shown = repr(instances[name] if isinstance(public, type) else public)
+    assert shown.count("\n") < 10
+    assert len(shown) < 600
+    assert not shown.startswith("<stseg")
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="nothing_of_that_name"):
+        getattr(stseg, "nothing_of_that_name")  # noqa: B009  # the checkers know that it is not there
+
+
+def test_importing_the_package_imports_nothing_slow() -> None:
+    code = "import sys, stseg; print(*(m for m in ('numba', 'cv2', 'h5py', 'scipy') if m in sys.modules))"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == ""
+
+
+def test_the_package_is_the_command() -> None:
+    shown = subprocess.run([sys.executable, "-m", "stseg", "--version"], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == stseg.__version__
+
+
+# Calls
+
+
+def _dies_elsewhere(process: int) -> int:
+    if os.getpid() != process:
+        os._exit(1)
+    return 7
+
+
+def _refuses() -> None:
+    raise ConfigError("--frames", "", "none", "some")
+
+
+def _compiles() -> int:
+    return int(numba.njit(lambda: 3)())
+
+
+def test_a_call_is_made_in_another_process() -> None:
+    with called_beside(print, os.getpid) as result:
+        assert result() != os.getpid()
+
+
+def test_a_call_whose_process_dies_is_made_here() -> None:
+    with called_beside(print, _dies_elsewhere, os.getpid()) as result:
+        assert result() == 7
+
+
+def test_a_call_here_is_made_once_its_result_is_asked_for() -> None:
+    made = list[int]()
+    with called_here(made.append, 1) as result:
+        assert not made
+        result()
+    assert made == [1]
+
+
+def test_an_error_passes_from_the_other_process() -> None:
+    with called_beside(print, _refuses) as result, pytest.raises(ConfigError, match="--frames"):
+        result()
+
+
+@pytest.mark.skipif(not COMPILED, reason="kernels are not compiled")
+def test_what_the_other_process_compiles_is_noted() -> None:
+    notes = list[str]()
+    with called_beside(notes.append, _compiles) as result:
+        assert result() == 3
+    assert notes == ["compiling kernels, once on this machine, about a minute of work"]
+
+
+# Plans
+
+
+@compiled_only
+def test_the_file_becomes_as_large_as_planned(
+    rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", str(rig_path), *OPTIONS, "--workers", "1", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["frames"], told["segments"], told["workers"]) == (FRAMES, 6, 1)
+    assert told["seconds"] == pytest.approx(sum(told[k] for k in ("counting", "learning", "tracking", "joining")))
+    assert min(told["tracking"], told["joining"]) > 0
+    assert track(rig_path, tmp_path / "run.h5") == 0
+    assert told["file_bytes"] == pytest.approx((tmp_path / "run.h5").stat().st_size, rel=0.25)
+
+
+@compiled_only
+def test_it_is_told_in_words(rig_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", str(rig_path), *OPTIONS, "--frames", "0:20", "--workers", "3"]) == 0
+    told = capsys.readouterr().out
+    assert "20 frames" in told
+    assert "3 workers" in told
+    assert "MiB an hour" in told
+
+
+@compiled_only
+def test_workers_share_the_segments() -> None:
+    def seconds(workers: int) -> float:
+        return Forecast(1000, 5, workers, 1.0, 2.0, 8.0, 3.0, 1).seconds
+
+    assert [seconds(k) for k in (1, 2, 3, 5, 9)] == pytest.approx([14.0, 10.0, 8.0, 6.0, 6.0])
+
+
+@compiled_only
+def test_a_part_that_is_none_is_refused(rig_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", str(rig_path), "--frames", "10:400"]) == 2
+    assert "--frames: found '10:400', expected a part of the recording's frames, 0:40" in capsys.readouterr().err

@@ -1,7 +1,8 @@
-"""Many hands: the result is the same whoever made the segments, and whoever died on the way."""
+"""Workers: the same bits on any number of them, and processes that end."""
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -16,6 +17,9 @@ from typing import NamedTuple
 
 import pytest
 from recordings import ENVIRONMENT, assert_same, compiled_only, track, write_recording
+
+from stseg.engine.workers import worker_processes
+from stseg.engine.workers.worker_processes import processes_that_fit
 
 pytestmark = compiled_only
 
@@ -157,3 +161,20 @@ def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
 def test_a_scheduler_that_is_not_there(rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert track(rig_path, tmp_path / "run.h5", "--scheduler", "tcp://127.0.0.1:9") == 2
     assert "no scheduler at tcp://127.0.0.1:9" in capsys.readouterr().err
+
+
+# Processes
+
+
+@pytest.fixture(autouse=True)
+def machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """16 cores, 8 GiB of free memory."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(16)), raising=False)
+    monkeypatch.setattr(worker_processes, "free_memory", lambda: 8 * 2**30)
+
+
+@pytest.mark.parametrize(
+    ("ground_side", "views", "processes"), [(6, 4, 11), (20, 7, 5), (40, 8, 1), (400, 8, 1)]
+)  # one of 20 m and 7 views was measured at 0.9 GiB, one of 40 m and 7 views at 3.8 GiB
+def test_a_large_ground_leaves_room_for_fewer(ground_side: int, views: int, processes: int) -> None:
+    assert processes_that_fit(views * 10 * (10 * ground_side) ** 2) == processes

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fuzz import detection_files as files
+from fuzz import corpus as files
 from fuzz.target import Target, plain
 from stseg.geometry import Camera
 from stseg.io.recording.recording import Source, SourceKind

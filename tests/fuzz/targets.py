@@ -11,9 +11,9 @@ import numpy as np
 from run_files import small_trajectory, write_small_run
 
 from fuzz import corpus
-from fuzz.detection_files import BOXES
+from fuzz.corpus import BOXES
 from fuzz.detection_targets import CAMERA, DETECTION_TARGETS, frames
-from fuzz.hdf5_mutations import mutated_objects
+from fuzz.mutations import mutated_objects
 from fuzz.target import Target, plain
 from stseg.calibration.points.point_fit import Points, fit_points
 from stseg.commands.calibrate.page import calibrate_page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from strollers import BORDER, CONFIG, RATE, Path, rows_of, straight, swapped, visit
+from simulated_people import BORDER, CONFIG, RATE, Path, rows_of, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.association import IdentityProblem, associate_globally

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
+from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Ints, Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally

@@ -1,24 +1,36 @@
-"""The search of identities: against every partition of a few rows, with a short lag, and what sizes say of people."""
+"""The search of identities, and answers as its hard constraints."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
+from recordings import track, write_recording
 from reference_identities import crossings, greatest_score, score
-from strollers import BORDER, CONFIG, RATE, rows_of, runs, straight, swapped, visit
+from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
+from stseg.commands.correct import correct
+from stseg.errors import FormatError, InputError
+from stseg.identities.association import IdentityProblem, associate_globally
 from stseg.identities.evidence.observations import Observations, observe
 from stseg.identities.evidence.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
+from stseg.identities.review.answered_constraints import answered_rows
+from stseg.identities.review.corrections import Answer
 from stseg.identities.search import beam_search as search
 from stseg.identities.search.beam_search import SearchLimits, search_identities
 from stseg.identities.search.choice import choose_distinct, empty_present
+from stseg.identities.search.constraints import Constraints
 from stseg.identities.search.costs import crossing, crossings_of
 from stseg.identities.search.extension import Alternatives
 from stseg.identities.search.hypotheses import Hypotheses, Pasts
+from stseg.io.runfile.runs import read_run
+from stseg.records.tables import APPEARANCE
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
 
 MODEL = SizeModel(np.array([1.7]), np.array([0.03**2]), np.array([0.5]), np.array([0.1**2]), np.full(1, np.inf))
@@ -156,3 +168,189 @@ def test_few_people_keep_the_prior() -> None:
     tracklets = isolated_tracklets(rows, RATE)
     model = learn_sizes(MeasuredSizes.of_heights(rows["height"], CONFIG), rows["frame"], tracklets, RATE)
     assert model.spread[0] == pytest.approx(0.8 * CONFIG.body.height_spread**2, rel=0.05)
+
+
+# Constraints
+
+
+def identities(rows: Rows, constraints: Constraints) -> Ints:
+    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
+    problem = IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, constraints)
+    found = associate_globally(rows, problem, constraints)
+    return found.identity
+
+
+def row(rows: Rows, track: int, frame: int) -> int:
+    return int(np.flatnonzero((rows["id"] == track) & (rows["frame"] == frame))[0])
+
+
+def met(frame: int | None = None) -> Rows:
+    """Two of one height who meet; exchanged by the filter from a frame on."""
+    rows = rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), 1.7, range(160))}, noise=0.0)
+    return rows if frame is None else swapped(rows, frame)
+
+
+APART = ~np.isin(met()["frame"], range(72, 89))
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("pairs", [1, 2])
+def test_one_answer_decides_a_meeting_either_way(swap: bool, pairs: int) -> None:
+    rows = met()
+    after = (2, 1) if swap else (1, 2)
+    same = [(row(rows, one, 40), row(rows, other, 120)) for one, other in zip((1, 2), after, strict=True)]
+    found = identities(rows, Constraints.of(same[:pairs], []))
+    expected = swapped(rows, 80)["id"] if swap else rows["id"]
+    np.testing.assert_array_equal(found[APART], expected[APART])
+
+
+def test_who_is_not_the_one_before_is_the_other() -> None:
+    rows = met()
+    found = identities(rows, Constraints.of([], [(row(rows, 1, 40), row(rows, 1, 120))]))
+    np.testing.assert_array_equal(found[APART], swapped(rows, 80)["id"][APART])
+
+
+def test_who_was_away_for_long_is_the_same_if_somebody_says_so() -> None:
+    away = CONFIG.tracking.maximum_gap + 3.0
+    rows = gone(away)
+    last, first = row(rows, 1, 23), row(rows, 2, 24 + round(away * RATE))
+    assert len(set(identities(rows, Constraints.of([], [])).tolist())) == 2
+    assert len(set(identities(rows, Constraints.of([(last, first)], [])).tolist())) == 1
+    near = gone(2.0)
+    pair = [(row(near, 1, 23), row(near, 2, 40))]
+    assert len(set(identities(near, Constraints.of([], pair)).tolist())) == 2
+
+
+@settings(max_examples=40, deadline=None)
+@given(runs(4), st.data())
+def test_whatever_can_be_true_is_obeyed(rows: Rows, data: st.DataObject) -> None:
+    """Constraints of any naming in which nobody is twice in a frame."""
+    rng = np.random.default_rng(data.draw(st.integers(0, 99)))
+    naming = np.array([rng.permutation(9)[k] for k in range(9)])
+    shuffled = rows["id"].copy()
+    for frame in np.unique(rows["frame"]):
+        here = rows["frame"] == frame
+        if rng.random() < 0.3:
+            shuffled[here] = naming[rng.permutation(9)[: here.sum()]]
+    pairs = [(a, b) for a in range(len(rows)) for b in range(len(rows)) if rows["frame"][a] < rows["frame"][b]]
+    chosen = [pairs[k] for k in rng.permutation(len(pairs))[:6]]
+    same = [pair for pair in chosen if shuffled[pair[0]] == shuffled[pair[1]]]
+    constraints = Constraints.of(same, [pair for pair in chosen if pair not in same])
+    assert not constraints.violated(identities(rows, constraints)).any()
+
+
+def test_constraints_of_nobody_change_nothing() -> None:
+    rows = met(80)
+    free = identities(rows, Constraints.of([], []))
+    told = [(row(rows, 1, 10), row(rows, 1, 20)), (row(rows, 2, 10), row(rows, 2, 60))]
+    np.testing.assert_array_equal(identities(rows, Constraints.of(told, [])), free)
+
+
+# Answers
+
+
+def bound(rows: Rows, *answers: Answer) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
+    """Track and frame of both rows of what is the same, and of what is not."""
+    found = answered_rows(rows, answers, RATE).constraints
+    told = [
+        (*(int(rows[name][a]) for name in ("id", "frame")), *(int(rows[name][b]) for name in ("id", "frame")))
+        for a, b in zip(found.earlier, found.later, strict=True)
+    ]
+    return [one for one, same in zip(told, found.same, strict=True) if same], [
+        one for one, same in zip(told, found.same, strict=True) if not same
+    ]
+
+
+def test_answers_bind_rows_where_people_stand_apart() -> None:
+    rows = met()
+    away = 2 * np.abs(rows["x"][rows["id"] == 1])
+    last, first = int(np.flatnonzero(away[:80] >= 0.8)[-1]), 80 + int(np.flatnonzero(away[80:] >= 0.8)[0])
+    assert bound(rows, Answer("a", "swap", 1, 2, 80)) == ([(1, last, 2, first), (2, last, 1, first)], [])
+    assert bound(rows, Answer("a", "keep", 1, 2, 80)) == ([(1, last, 1, first), (2, last, 2, first)], [])
+    assert bound(rows, Answer("a", "split", 1, frame=80)) == ([], [(1, last, 1, first)])
+
+
+def test_answers_about_gaps_bind_the_ends() -> None:
+    rows = gone(2.0)
+    assert bound(rows, Answer("a", "join", 1, 2)) == ([(1, 23, 2, 40)], [])
+    assert bound(rows, Answer("a", "keep", 1, 2, 30)) == ([], [(1, 23, 2, 40)])
+    assert bound(rows, Answer("a", "keep", 1, frame=10)) == ([], [])
+
+
+def test_who_is_no_person_binds_nothing() -> None:
+    rows = rows_of({k: (straight(-3, k, 0.5, 0), 1.7, range(40)) for k in (1, 2)})
+    told = answered_rows(rows, [Answer("a", "delete", 2, frame=20), Answer("b", "swap", 1, 2, 20)], RATE)
+    assert told.deleted.tolist() == ((rows["id"] == 2) & (rows["frame"] >= 20)).tolist()
+    assert len(told.constraints) == 1
+    assert len(answered_rows(rows, [Answer("b", "swap", 1, 2, 20)], RATE).constraints) == 2
+
+
+# The command
+
+
+def test_a_run_is_solved_again(tmp_path: Path) -> None:
+    """Without answers nothing changes; a swap exchanges tracks and labels, and names follow; the rest stays."""
+    run_file = tmp_path / "run.h5"
+    assert track(write_recording(tmp_path), run_file) == 0
+    run = read_run(run_file)
+    assert len(run.committed) >= len(run.trajectory) - 5
+    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nkeep,20,1,,\n")
+    correct(run_file, tmp_path / "a.csv", output=tmp_path / "same.h5")
+    same = read_run(tmp_path / "same.h5")
+    for name in ("trajectory", "tracks", "boxes"):
+        np.testing.assert_array_equal(getattr(same, name), getattr(run, name))
+    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\nname,,2,,Bo\ndelete,,3,,\n")
+    correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    new = read_run(tmp_path / "new.h5")
+    assert set(new.tracks["id"].tolist()) == {1, 2}
+    assert new.names == {2: "Bo"}
+    for frame in (2, 37):
+        places = [
+            {int(r["id"]): (r["raw_x"], r["raw_y"]) for r in one.trajectory[one.trajectory["frame"] == frame]}
+            for one in (run, new)
+        ]
+        crossed = (1, 2) if frame < 20 else (2, 1)
+        assert [places[1][1], places[1][2]] == [places[0][k] for k in crossed]
+        before, after = run.read_frame(frame)[1], new.read_frame(frame)[1]
+        table = np.zeros(int(before.max()) + 1, before.dtype)
+        table[list(crossed)] = 1, 2
+        np.testing.assert_array_equal(after, table[before])
+    np.testing.assert_array_equal(new.read_frame(20)[0], run.read_frame(20)[0])
+
+
+def test_a_second_correction_keeps_earlier_answers(tmp_path: Path) -> None:
+    """Two corrections one after the other are both at once; an old one holds, whatever a later one says."""
+    run_file, answers = tmp_path / "run.h5", tmp_path / "a.csv"
+    assert track(write_recording(tmp_path), run_file) == 0
+    given = ("swap,20,1,2,\n", "delete,,3,,\n")
+    for text, source, result in ((given[0], run_file, "one.h5"), (given[1], tmp_path / "one.h5", "two.h5")):
+        answers.write_text(f"action,frame,id,other,name\n{text}")
+        correct(source, answers, output=tmp_path / result)
+    answers.write_text(f"action,frame,id,other,name\n{''.join(given)}")
+    correct(run_file, answers, output=tmp_path / "both.h5")
+    two, both = (read_run(tmp_path / f"{name}.h5") for name in ("two", "both"))
+    np.testing.assert_array_equal(two.trajectory, both.trajectory)
+    assert sorted(two.answers.tolist()) == sorted(both.answers.tolist())
+    answers.write_text("action,frame,id,other,name\nswap,20,1,2,\n")
+    with pytest.raises(InputError, match="contradicts others"):
+        correct(tmp_path / "one.h5", answers, output=tmp_path / "back.h5")
+
+
+def test_rows_that_are_not_there_are_refused(tmp_path: Path) -> None:
+    run_file = tmp_path / "run.h5"
+    assert track(write_recording(tmp_path), run_file) == 0
+    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\n")
+    correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    with h5py.File(tmp_path / "new.h5", "r+") as file:
+        file["answers"][0] = (10**6, 10**6 + 1, 1)
+    with pytest.raises(FormatError, match="/answers: found row 1000001"):
+        correct(tmp_path / "new.h5", tmp_path / "a.csv", output=tmp_path / "more.h5")
+
+
+def test_answers_that_cannot_all_be_true_are_refused(tmp_path: Path) -> None:
+    run_file = tmp_path / "run.h5"
+    assert track(write_recording(tmp_path), run_file) == 0
+    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\nkeep,20,1,2,\n")
+    with pytest.raises(InputError, match="contradicts others"):
+        correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    assert not (tmp_path / "new.h5").exists()

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from run_files import write_small_run
-from strollers import BORDER, CONFIG, RATE, rows_of, straight
+from simulated_people import BORDER, CONFIG, RATE, rows_of, straight
 
 from stseg.arrays import Floats, Rows
 from stseg.config import Config

@@ -1,9 +1,10 @@
-"""The queue of doubts, and its page in a real browser."""
+"""The queue of doubts and its page in a real browser; answers as corrections of a run."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from browser import CHROMIUM, chromium
@@ -11,10 +12,15 @@ from run_files import write_small_run
 
 from stseg.arrays import Rows
 from stseg.commands.correct import correct
+from stseg.commands.export import export
+from stseg.commands.report import report
 from stseg.commands.review import review
+from stseg.errors import FormatError, InputError
+from stseg.identities.review.corrections import Answer, Corrections, solve_corrections
 from stseg.identities.review.doubts import _together, find_doubts
+from stseg.io.answers import read_names
 from stseg.io.runfile.runs import read_run
-from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.records.tables import TRACK, TRAJECTORY, Tracks
 
 BORDER = np.array([[-5.0, -5.0], [5.0, 5.0]])
 
@@ -109,3 +115,117 @@ def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys:
 
 def test_without_tracks_nothing_is_doubted() -> None:
     assert find_doubts(np.zeros(0, TRAJECTORY), Tracks(np.zeros(0, TRAJECTORY)).summary(), 10.0, BORDER) == []
+
+
+# Corrections
+
+
+def tracks(*spans: tuple[int, int]) -> Rows:
+    rows = np.zeros(len(spans), TRACK)
+    for k, (first, last) in enumerate(spans):
+        rows[k]["id"], rows[k]["first"], rows[k]["last"] = k + 1, first, last
+    return rows
+
+
+def of(solved: Corrections, track: int, *frames: int) -> list[int]:
+    return [int(one) for one in solved.map(np.full(len(frames), track), np.array(frames))]
+
+
+TWO = tracks((0, 99), (0, 99))
+
+
+def test_a_swap_exchanges_from_its_frame_on() -> None:
+    solved = solve_corrections(TWO, [Answer("a", "swap", 1, 2, 50)])
+    assert of(solved, 1, 0, 49, 50, 99) == [1, 1, 2, 2] and of(solved, 2, 49, 50) == [2, 1]
+    solved = solve_corrections(TWO, [Answer("b", "swap", 2, 1, 70), Answer("a", "swap", 1, 2, 50)])
+    assert of(solved, 1, 49, 50, 69, 70) == [1, 2, 2, 1]
+
+
+def test_join_split_delete_and_name() -> None:
+    three = tracks((0, 40), (45, 99), (0, 99))
+    solved = solve_corrections(three, [Answer("a", "join", 1, 2), Answer("b", "name", 2, name="Ann")])
+    assert of(solved, 2, 45, 99) == [1, 1] and solved.names == {1: "Ann"}
+    solved = solve_corrections(three, [Answer("a", "split", 3, frame=50)])
+    assert of(solved, 3, 49, 50) == [3, 4]
+    solved = solve_corrections(three, [Answer("a", "delete", 3, frame=50), Answer("b", "delete", 1)])
+    assert of(solved, 3, 49, 50) == [3, 0] and of(solved, 1, 10) == [0]
+    assert of(solve_corrections(three, []), 0, 5) == [0]
+
+
+def test_a_swap_where_one_track_ends_hands_its_identity_over() -> None:
+    solved = solve_corrections(tracks((0, 99), (60, 99)), [Answer("a", "swap", 1, 2, 60)])
+    assert of(solved, 1, 59, 60) == [1, 2] and of(solved, 2, 60) == [1]
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (Answer("f: line 2", "swap", 1, 9, 5), "f: line 2: id: found 9, expected a track"),
+        (Answer("f", "swap", 1, 2), "frame: found nothing"),
+        (Answer("f", "split", 1, frame=200), "frame: found 200"),
+        (Answer("f", "join", 1, 2), "tracks 1 and 2, both there in frame 0"),
+        (Answer("f", "swap", 1, 1, 5), "another track"),
+    ],
+)
+def test_answers_that_cannot_be_are_named(answer: Answer, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        solve_corrections(TWO, [answer])
+
+
+def test_an_end_is_joined_once() -> None:
+    with pytest.raises(InputError, match="joined already"):
+        solve_corrections(tracks((0, 9), (20, 29), (20, 29)), [Answer("a", "join", 1, 2), Answer("b", "join", 1, 3)])
+
+
+def test_the_command_leaves_the_run_and_its_volume_alone(tmp_path: Path) -> None:
+    run = write_small_run(tmp_path / "run.h5")
+    before = run.read_bytes()
+    answers = tmp_path / "answers.csv"
+    answers.write_text("action,frame,id,other,name\nswap,14,1,2,\nname,,2,,Bo\n")
+    correct(run, answers, output=tmp_path / "new.h5")
+    assert run.read_bytes() == before
+    old, new = read_run(run), read_run(tmp_path / "new.h5")
+    rows = [(int(f), int(i), round(float(x), 2)) for f, i, x in new.trajectory[["frame", "id", "x"]]]
+    assert (13, 1, 0.15) in rows and (14, 2, 0.15) in rows and (14, 1, 0.3) in rows and (13, 2, 0.3) in rows
+    assert new.names == {2: "Bo"} and old.names == {}
+    np.testing.assert_array_equal(new.read_frame(15)[0], old.read_frame(15)[0])
+    assert (
+        new.read_frame(15)[1] == np.where(old.read_frame(15)[1] == 1, 2, np.where(old.read_frame(15)[1] == 2, 1, 0))
+    ).all()
+    with h5py.File(tmp_path / "new.h5") as file:
+        assert file["provenance/answers"].asstr()[()].startswith("action,frame")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("frame,id\n1,2\n", "header: found frame,id, expected the columns action"),
+        ("action,frame,id\nswitch,1,2\n", "line 2: found action 'switch'"),
+        ("action,frame,id\nsplit,x,2\n", "line 2: found frame 'x', expected a whole number"),
+        ("action,frame,id\nsplit,4,\n", "line 2: found no id"),
+    ],
+)
+def test_malformed_answers_are_one_line(tmp_path: Path, text: str, message: str) -> None:
+    run = write_small_run(tmp_path / "run.h5")
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(FormatError, match=message):
+        correct(run, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    assert not (tmp_path / "new.h5").exists()
+
+
+def test_names_are_read_once_each(tmp_path: Path) -> None:
+    (tmp_path / "n.csv").write_text("id,name\n3,Ann\n3,Bo\n")
+    with pytest.raises(FormatError, match="line 3: found id 3 twice"):
+        read_names(tmp_path / "n.csv")
+
+
+def test_names_go_through_exports_and_report(tmp_path: Path) -> None:
+    run = write_small_run(tmp_path / "run.h5")
+    (tmp_path / "names.csv").write_text('id,name\n2,"Bo, the <second>"\n')
+    export(run, to="csv", output=tmp_path / "t.csv", names=tmp_path / "names.csv")
+    lines = (tmp_path / "t.csv").read_text().splitlines()
+    assert lines[0].endswith(",name") and lines[1].endswith(",") and lines[-1].endswith(',"Bo, the <second>"')
+    export(run, to="geojson", output=tmp_path / "t.geojson", names=tmp_path / "names.csv")
+    assert '"name": "Bo, the <second>"' in (tmp_path / "t.geojson").read_text()
+    report(run, output=tmp_path / "r.html", names=tmp_path / "names.csv")
+    assert "Bo, the &lt;second&gt;" in (tmp_path / "r.html").read_text()

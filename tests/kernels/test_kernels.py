@@ -1,17 +1,19 @@
-"""Kernels: compiled with all that they call, kept in the cache, called by Python and by kernels alike."""
+"""Kernels: compiled with all that they call, kept in the cache, with named tuples passed by address."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from recordings import ENVIRONMENT
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 from stseg.kernels.accelerate import kernel, python_form
+from stseg.kernels.pointed_tuples import pointed
 
 PROGRAM = """
 import sys
@@ -89,3 +91,61 @@ def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
     assert sorted(len(lines) for lines in printed) == [2, 3]
     assert sum("compiling" in lines[0] for lines in printed) == 1
     assert [lines[-2] for lines in printed] == ["4.9 1 0", "4.9 1 0"]
+
+
+# Tuples by address
+
+
+class Walk(NamedTuple):
+    """Steps of a walk."""
+
+    step: Floats
+    number: int
+
+
+class Walker(NamedTuple):
+    """A walk within a tuple, beside other fields."""
+
+    name: Ints
+    walk: Walk
+    pace: float
+
+
+@kernel
+def distance(walker: Walker) -> float:
+    """The length of the way; marks the walker as done."""
+    walker.name[0] = -1
+    total = 0.0
+    for k in range(walker.walk.number):
+        total += walker.pace * walker.walk.step[k]
+    return total
+
+
+@kernel
+def distance_by_address(walker: Walker) -> float:
+    return distance(pointed(walker))
+
+
+@kernel
+def farthest_of_own_walks(number: int, steps: int) -> float:
+    """Kernels may make tuples themselves, and pass them to the one that asks for the address."""
+    farthest = 0.0
+    for k in range(number):
+        walk = Walk(np.full(steps, float(k)), steps)
+        farthest = max(farthest, distance_by_address(Walker(np.zeros(1, np.int64), walk, 0.5)))
+    return farthest
+
+
+def test_fields_of_inner_tuples_are_those_of_the_whole() -> None:
+    walker = Walker(np.array([7]), Walk(np.array([1.0, 2.0, 4.0]), 2), 0.5)
+    assert distance_by_address(walker) == distance(walker) == 1.5
+
+
+def test_arrays_are_not_copied() -> None:
+    walker = Walker(np.array([7, 8]), Walk(np.empty(0), 0), 0.5)
+    distance_by_address(walker)
+    np.testing.assert_array_equal(walker.name, [-1, 8])
+
+
+def test_what_a_kernel_makes_itself_lasts_as_long_as_the_call() -> None:
+    assert farthest_of_own_walks(200, 1000) == 199 * 0.5 * 1000

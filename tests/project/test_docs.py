@@ -1,16 +1,20 @@
-"""Pages name what is there: links, files, commands, keys, tables, functions; sentences and notes are short."""
+"""Pages: links, files, keys, columns, code and sentences."""
 
 from __future__ import annotations
 
+import ast
 import re
+import shlex
 import sys
 import tomllib
+from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
+from recordings import compiled_only, track, write_recording
 
-from stseg.commands.main import COMMANDS
+from stseg.commands.main import COMMANDS, _app
 from stseg.config import Config
 from stseg.config.keys import values
 from stseg.io.calibrations.formats import FORMATS as CALIBRATIONS
@@ -173,3 +177,101 @@ def test_every_format_has_a_row() -> None:
 def test_ci_runs_the_test_command_of_the_readme() -> None:
     (command,) = re.findall(r"^python3 -m venv .* (-m pytest .*)$", README, re.MULTILINE)
     assert f'"$bin/python" {command} |' in (ROOT / ".ci" / "run").read_text("utf-8")
+
+
+# Code
+
+
+CODE_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+_CODE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return [text for name, text in _CODE.findall(page.read_text("utf-8")) if name == language]
+
+
+def lacking(code: str) -> set[str]:
+    """Libraries that a block imports and that are not installed."""
+    nodes = list(ast.walk(ast.parse(code)))
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    return {name for name in {name.partition(".")[0] for name in names} if find_spec(name) is None}
+
+
+def commands(page: Path) -> list[list[str]]:
+    """The calls of stseg in a page's shell blocks, without those that stand for others."""
+    found = []
+    for block in blocks(page, "sh"):
+        for line in block.replace("\\\n", " ").splitlines():
+            tokens = shlex.split(line, comments=True)
+            if tokens[:1] == ["stseg"] and not {"...", "COMMAND", "FORMAT"} & set(tokens):
+                end = next((k for k, token in enumerate(tokens) if token in ("|", "&&", "&", ";", ">")), len(tokens))
+                found.append(tokens[1:end])
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording and its run under the names that pages give them."""
+    place = tmp_path_factory.mktemp("docs")
+    assert track(write_recording(place), place / "run.h5") == 0
+    (place / "RUN.h5").symlink_to(place / "run.h5")
+    return place
+
+
+@compiled_only
+@pytest.mark.parametrize("page", [p for p in CODE_PAGES if blocks(p, "python")], ids=lambda page: page.name)
+def test_python_blocks_run(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    names: dict[str, object] = {}
+    for number, code in enumerate(blocks(page, "python")):
+        if not lacking(code):
+            exec(compile(code, f"{page.name}, block {number}", "exec"), names)
+
+
+@pytest.mark.parametrize("page", [p for p in CODE_PAGES if commands(p)], ids=lambda page: page.name)
+def test_commands_parse(page: Path) -> None:
+    for tokens in commands(page):
+        _app(tokens).parse_args(tokens, exit_on_error=False, print_error=False)
+
+
+# Sentences
+
+
+PROSE_PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "CHANGELOG.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
+SENTENCE_WORDS = 25
+"""Greatest number of words of a sentence."""
+_BLOCK = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+_EQUATION = re.compile(r"^ {4,}(?![-*\d]).*$", re.MULTILINE)
+_START = re.compile(r"^ *(?:[-*] |\d+\. |#+ |> )", re.MULTILINE)
+
+
+def sentences(page: str) -> list[str]:
+    """The sentences in their order; a colon and a semicolon end one, inline code is one word."""
+    text = _EQUATION.sub("\n", _BLOCK.sub("\n", page))
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", re.sub(r"`[^`]*`", "code", text))
+    text = _START.sub("\n\n", re.sub(r"^\|.*\|$", lambda row: row[0].replace("|", "\n\n"), text, flags=re.MULTILINE))
+    blocks = (re.sub(r"\s+", " ", block).strip() for block in re.split(r"\n\s*\n", text))
+    return [sentence for block in blocks for sentence in re.split(r"(?<=[.!?:;])[\"')*_]*\s", block) if sentence]
+
+
+def word_count(sentence: str) -> int:
+    """Number of words: what has a letter or a digit in it."""
+    return sum(bool(re.search(r"\w", word)) for word in sentence.split())
+
+
+def test_lists_tables_and_headings_end_sentences() -> None:
+    page = "# One\n\nTwo words, 0.5 m. Next: `a b c` (ends).\nStill\n\n- item\n- second\n\n| a | b c |\n\n    x = y\n"
+    found = [sentence for sentence in sentences(page) if word_count(sentence)]
+    assert found == ["One", "Two words, 0.5 m.", "Next:", "code (ends).", "Still", "item", "second", "a", "b c"]
+
+
+@pytest.mark.parametrize("page", PROSE_PAGES, ids=[page.relative_to(ROOT).as_posix() for page in PROSE_PAGES])
+def test_sentences_are_short(page: Path) -> None:
+    assert [one for one in sentences(page.read_text("utf-8")) if word_count(one) > SENTENCE_WORDS] == []

@@ -1,4 +1,4 @@
-"""Charts of people and tracks over time agree with the tables."""
+"""Charts, statistics and maps of a run agree with its tables."""
 
 from __future__ import annotations
 
@@ -10,9 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stseg.arrays import Rows
+from stseg.geometry import Grid, Rig
 from stseg.records.tables import TRACK, TRAJECTORY
 from stseg.reporting.charts import clock_time, people_chart, track_chart
-from stseg.reporting.run_statistics import Span, doubtful_stretches, mean_certainty
+from stseg.reporting.pictures.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
+from stseg.reporting.pictures.plan_map import PlanMap
+from stseg.reporting.run_statistics import (
+    Span,
+    busiest_minutes,
+    doubtful_stretches,
+    ground_by_views,
+    mean_certainty,
+    people_by_hour,
+    people_per_minute,
+)
 
 
 def trajectory_of(*rows: tuple[int, int, float, float]) -> Rows:
@@ -81,3 +92,149 @@ def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
 
 def test_clock_times() -> None:
     assert [clock_time(second) for second in (0, 12.4, 75, 7385)] == ["0 s", "12.4 s", "1:15", "2:03:05"]
+
+
+# Statistics
+
+
+def stays(*tracks: tuple[int, int]) -> Rows:
+    """A track from each first frame to its stop."""
+    rows = np.zeros(sum(stop - first for first, stop in tracks), TRAJECTORY)
+    rows["id"] = np.repeat(np.arange(1, len(tracks) + 1), [stop - first for first, stop in tracks])
+    rows["frame"] = np.concatenate([np.arange(*one) for one in tracks])
+    return rows
+
+
+def test_people_by_the_hour() -> None:
+    span = Span(100, 100 + 5400, 1.0)
+    first, second = people_by_hour(span, stays((100, 1900), (1000, 4600)))
+    assert (first.first, first.stop, first.most, first.come) == (100, 3700, 2, 2)
+    assert first.mean == (1800 + 2700) / 3600
+    assert (second.first, second.stop, second.most, second.come, second.mean) == (3700, 5500, 1, 0, 0.5)
+
+
+def test_the_busiest_minutes_are_in_order_of_time() -> None:
+    span = Span(0, 600, 1.0)
+    found = busiest_minutes(span, stays((300, 360), (300, 360), (60, 120), (480, 500)))
+    assert [(one.first, one.mean, one.come) for one in found] == [(60, 1.0, 1), (300, 2.0, 2), (480, 1 / 3, 1)]
+    assert busiest_minutes(span, stays((0, 0))) == []
+
+
+def test_each_minute_has_its_own_mean() -> None:
+    frames = np.arange(30, 30 + 90)  # a minute and a half, one frame a second
+    rows = np.zeros(60 + 90, TRAJECTORY)
+    rows["frame"] = np.concatenate([np.arange(30, 90), frames])
+    np.testing.assert_allclose(people_per_minute(frames, rows, 1.0), [2, 1])
+    assert people_per_minute(frames[:0], rows[:0], 1.0).shape == (0,)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.integers(0, 199), max_size=60), st.floats(0.2, 3))
+def test_minutes_add_up_to_all_people(drawn: list[int], frame_rate: float) -> None:
+    frames, rows = np.arange(200), np.zeros(len(drawn), TRAJECTORY)
+    rows["frame"] = drawn
+    length = max(1, round(60 * frame_rate))
+    minutes = people_per_minute(frames, rows, frame_rate)
+    lengths = np.diff([*range(0, 200, length), 200])
+    np.testing.assert_allclose(minutes @ lengths, len(drawn))
+
+
+def test_shares_of_the_ground_that_counts() -> None:
+    views = np.zeros((2, 2, 3), np.uint8)
+    views[1, 0] = 2
+    views[0, 1, 0] = 1
+    inside = np.array([[True, True, False], [True, True, False]])
+    np.testing.assert_allclose(ground_by_views(views, inside, 2), [0.25, 0.25, 0.5])
+
+
+# Maps
+
+
+GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
+RIG = Rig("hall", 2.0, GRID, ())
+BINS = Bins((0.0, 4.0), (-1.0, 2.0), 1.0)
+
+
+def rows_of(*rows: tuple[int, int, float, float]) -> Rows:
+    """Rows of frame, id, x, y."""
+    table = np.zeros(len(rows), TRAJECTORY)
+    for name, column in zip(("frame", "id", "x", "y"), zip(*rows, strict=True), strict=False):
+        table[name] = column
+    return table
+
+
+def test_density_is_people_a_square_metre() -> None:
+    found = density(BINS, rows_of((0, 1, 0.5, -0.5), (1, 1, 0.6, -0.4), (1, 2, 3.9, 1.9), (1, 3, 9, 9)), 2)
+    assert found.shape == (3, 4)
+    assert (found[0, 0], found[2, 3], found.sum()) == (1, 0.5, 1.5)
+    assert density(Bins(BINS.x, BINS.y, 0.5), rows_of((0, 1, 0.2, -0.9)), 1)[0, 0] == 4
+
+
+def test_a_return_begins_another_stay() -> None:
+    home, away = (0.5, -0.5), (2.5, -0.5)
+    walk = [home, home, home, home, away, home, home, away]
+    found = dwell(BINS, rows_of(*((frame, 1, *place) for frame, place in enumerate(walk))), 2.0)
+    assert (found[0, 0], found[0, 2]) == (6 / 2 / 2.0, 2 / 2 / 2.0)  # frames a stay at two frames a second
+    two = rows_of((0, 1, *home), (1, 1, *home), (0, 2, *home), (1, 2, *home))
+    assert dwell(BINS, two, 2.0)[0, 0] == 1
+    assert not dwell(BINS, rows_of(), 2.0).any()
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.floats(-1, 5), st.floats(-2, 3)), max_size=50))
+def test_every_row_on_the_ground_is_counted_once(places: list[tuple[float, float]]) -> None:
+    rows = rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(places)))
+    inside = (rows["x"] >= 0) & (rows["x"] < 4) & (rows["y"] >= -1) & (rows["y"] < 2)
+    assert BINS.count(BINS.index(rows)).sum() == inside.sum()
+
+
+def test_bins_are_round_and_never_finer_than_cells() -> None:
+    assert Bins.of(GRID).side == 0.5
+    assert Bins.of(Grid((0, 5), (0, 5), 0.1)).side == 0.25
+    assert Bins.of(Grid((0, 30), (0, 5), 0.1)).side == 1.0
+
+
+def test_haunts_are_where_most_time_is_spent() -> None:
+    rng = np.random.default_rng(3)
+    waiting = rng.normal((1.0, 0.0), 0.1, (300, 2))
+    talking = rng.normal((3.0, 1.0), 0.1, (100, 2))
+    passing = rng.uniform((0, -1), (4, 2), (20, 2))
+    places = np.concatenate([waiting, talking, passing])
+    found = dwell_places(
+        rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(places.tolist()))), Bins(BINS.x, BINS.y, 0.25)
+    )
+    assert len(found) == 2
+    np.testing.assert_allclose([(place.x, place.y) for place in found], [(1, 0), (3, 1)], atol=0.15)
+    np.testing.assert_allclose([place.share for place in found], [300 / 420, 100 / 420], atol=0.04)
+
+
+def test_nobody_dwells_where_all_walk_alike() -> None:
+    even = np.stack(np.meshgrid(np.arange(0.05, 20, 0.25), np.arange(0.05, 20, 0.25)), -1).reshape(-1, 2)
+    rows = rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(even.tolist())))
+    assert dwell_places(rows, Bins((0.0, 20.0), (0.0, 20.0), 0.5)) == []
+    assert dwell_places(rows[:0], BINS) == []
+
+
+def test_a_heat_map_is_dark_where_much_is() -> None:
+    values = np.zeros(BINS.shape)
+    values[2, 3], values[0, 0] = 8.0, 2.0
+    picture = heat_map(RIG, BINS, values, "title", "units").astype(int)
+    plan = PlanMap.fit(GRID, np.zeros((0, 2)), 900, 900)
+    tones = []
+    for place in ((3.3, 1.3), (0.3, -0.7), (0.3, 1.3)):
+        u, v = np.rint(plan.pixel(np.array(place))).astype(int)
+        tones.append(picture[v, u].sum())
+    assert tones[0] < tones[1] < tones[2]
+    assert heat_map(RIG, BINS, np.zeros(BINS.shape), "", "").shape == picture.shape
+    brightness = warm_colours(np.linspace(0, 1, 9), 1.0).astype(int).sum(axis=1)
+    assert (np.diff(brightness) < 0).all()
+
+
+def test_blind_ground_is_red() -> None:
+    views = np.full(GRID.shape, 1, np.uint8)
+    views[:, 0, 0] = 0  # least x, least y
+    picture = blind_map(RIG, views)
+    plan = PlanMap.fit(GRID, np.zeros((0, 2)), 900, 900)
+    u, v = np.rint(plan.pixel(np.array([0.25, -0.65]))).astype(int)
+    blue, green, red = picture[v, u].tolist()
+    assert red > 150 > max(blue, green)

@@ -1,15 +1,14 @@
-"""Motion field of cells, and blobs of labelled cells."""
+"""Blobs of labelled cells and their measures, against plain NumPy."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-import reference_blobs
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from strategies import numbers
 
-from stseg.arrays import Flags, Floats
+from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.records.blobs import UNASSIGNED, Blobs
@@ -17,6 +16,44 @@ from stseg.segmentation.blob_measures import BlobMeasures, fill_ground_labels, f
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_motion import motion_field
 from stseg.segmentation.patches import Patches
+
+_FAINT = 1e-6
+
+
+def ground_labels(label: Labels, log_odds: Singles) -> Labels:
+    """Label with the most mass above each ground cell, int32 (y, x); 0 for none."""
+    labels = np.unique(label[label != 0])
+    ground_label, most = np.zeros(label.shape[1:], np.int32), np.zeros(label.shape[1:])
+    strength = np.nan_to_num(log_odds).clip(0) + _FAINT
+    for track_id in labels:
+        mass = np.where(label == track_id, strength, 0.0).sum(0)
+        ground_label[mass > most] = track_id
+        np.maximum(most, mass, out=most)
+    return ground_label
+
+
+def measures(cells: Labels, track: Ints, label: Labels, log_odds: Singles, grid: Grid) -> BlobMeasures:
+    """BlobMeasures of blobs; see `stseg.segmentation.blob_measures`."""
+    n, cell_ground = len(track), grid.ground
+    occupied = label == np.append(0, track)[cells]
+    occupied &= label != 0
+    strength = np.where(occupied, np.nan_to_num(log_odds), 0.0)
+    weight = strength.clip(0).sum(0) + _FAINT
+    ground, covariance = np.zeros((n, 2)), np.zeros((n, 2, 2))
+    count, height, mass = np.zeros(n), np.zeros(n), np.zeros(n)
+    for b in range(n):
+        inside = cells == b + 1
+        share = weight[inside] / weight[inside].sum()
+        blob_ground = cell_ground[inside]
+        ground[b] = share @ blob_ground
+        spread = blob_ground - ground[b]
+        covariance[b] = (spread * share[:, None]).T @ spread / max(inside.sum(), 1)
+        count[b] = inside.sum()
+        planes = occupied[:, inside].any(1)
+        height[b] = grid.heights[np.flatnonzero(planes)[-1]]
+        mass[b] = strength[:, inside].sum() / max(occupied[:, inside].sum(), 1)
+    return BlobMeasures(ground, covariance, count, height, mass)
+
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 
@@ -190,11 +227,11 @@ def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
     log_odds[random.random(GRID.shape) < 0.1] = np.nan
     ground_label = np.zeros(GRID.shape[1:], np.int32)
     fill_ground_labels(label, log_odds, ground_label)
-    np.testing.assert_array_equal(ground_label, reference_blobs.ground_labels(label, log_odds))
+    np.testing.assert_array_equal(ground_label, ground_labels(label, log_odds))
     track = np.unique(ground_label[ground_label != 0]).astype(np.int64)
     cells = np.where(ground_label != 0, 1 + track.searchsorted(ground_label), 0).astype(np.int32)
     n = len(track)
     found = BlobMeasures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
     fill_measures(cells, track, label, log_odds, GRID.ground, GRID.heights, found)
-    for own, plain in zip(found, reference_blobs.measures(cells, track, label, log_odds, GRID), strict=True):
+    for own, plain in zip(found, measures(cells, track, label, log_odds, GRID), strict=True):
         np.testing.assert_allclose(own, plain, rtol=1e-4, atol=1e-5)

@@ -1,4 +1,4 @@
-"""Scenes of people who come close: what happens in them, and that nobody is taken for somebody else."""
+"""The area and its border, encounters of tracks and their events."""
 
 from __future__ import annotations
 
@@ -8,20 +8,31 @@ from itertools import combinations, islice, pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import boxes, found, people, room
 
-from stseg.arrays import Bytes, Flags
+from stseg import Tracker
+from stseg.arrays import Bytes, Flags, Floats, Observation, Rows
 from stseg.config import Config, TrackingConfig
+from stseg.engine.committed_frames import within_area
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.geometry import Grid, Rig
 from stseg.io.recording.frames import FrameSet
 from stseg.kernels.accelerate import COMPILED
-from stseg.records.tables import APPEARANCE
+from stseg.records.blobs import Blobs
+from stseg.records.sparse_volume import SparseVolume
+from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, WINDOW
 from stseg.simulation import NAMED, Route, SceneFilm, SceneSpec
 from stseg.simulation.crowd.script import walk_routes
 from stseg.simulation.film import RenderedFrame as Filmed
+from stseg.trackers import Commit, FusedFrame
+from stseg.trackers.rows import event_rows
+from stseg.tracking.windows.encounters import encounters, touches
 from stseg.tracking.windows.windows import windows
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
@@ -154,3 +165,141 @@ def test_nobody_is_taken_for_somebody_else_from_boxes(name: str) -> None:
 def test_nobody_is_taken_for_somebody_else_from_silhouettes(name: str) -> None:
     """The first six seconds, in which people cross."""
     assert switches(name, "pixels", 60) == 0
+
+
+# Events
+
+
+LENGTH, RATE = 30, 5.0
+
+
+def frame_of(pairs: set[tuple[int, int]]) -> Blobs:
+    """Four blobs, of which these touch."""
+    none = np.zeros((0, 2))
+    names, amounts = np.zeros(4, np.int64), np.zeros(4)
+    touching = np.array(sorted(pairs), np.int64).reshape(-1, 2)
+    cells = np.zeros((1, 1), np.int32)
+    return Blobs(cells, names, names, none, none, amounts, amounts, amounts, touching)
+
+
+def told(touching: list[set[tuple[int, int]]], names: list[int], cuts: list[int]) -> Rows:
+    """What windows that are cut there tell; the blobs' names stay."""
+    rows = []
+    for first, stop in pairwise(sorted({0, *cuts, LENGTH})):
+        blobs = [frame_of(pairs) for pairs in touching[first:stop]]
+        rows += touches(first, blobs, [np.array(names)] * len(blobs))
+    return event_rows(sorted(rows))
+
+
+def same(track: int, _: int) -> int:
+    return track
+
+
+def plain(touching: list[set[tuple[int, int]]], names: list[int], parting: int) -> list[tuple[int, bytes, int, int]]:
+    """The definition, frame by frame."""
+    found = []
+    for a, b in {tuple(sorted((names[i], names[j]))) for pairs in touching for i, j in pairs}:
+        frames = [
+            f for f, pairs in enumerate(touching) if (a, b) in {tuple(sorted((names[i], names[j]))) for i, j in pairs}
+        ]
+        for k, frame in enumerate(frames):
+            if a > 0 and (k == 0 or frame - frames[k - 1] - 1 > parting):
+                found.append((frame, b"merge", a, b))
+            if a > 0 and frame < LENGTH - 1 and (k + 1 == len(frames) or frames[k + 1] - frame - 1 > parting):
+                found.append((frame + 1, b"split", a, b))
+    return sorted(found)
+
+
+PAIRS = st.sets(st.sampled_from([(0, 1), (0, 2), (1, 3), (2, 3)]), max_size=3)
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.lists(PAIRS, min_size=LENGTH, max_size=LENGTH), st.permutations([0, 1, 2, 7]),
+    st.lists(st.integers(1, LENGTH - 1), max_size=5), st.integers(0, 6),
+)  # fmt: skip
+def test_encounters_do_not_depend_on_the_windows(
+    touching: list[set[tuple[int, int]]], names: list[int], cuts: list[int], parting: int
+) -> None:
+    found = encounters(told(touching, names, cuts), same, parting, RATE, LENGTH - 1)
+    assert found[["frame", "kind", "id", "other"]].tolist() == plain(touching, names, parting)
+
+
+def test_an_encounter_says_how_long_it_was() -> None:
+    touching = [{(0, 1)} if 3 <= f < 13 and f != 8 else set() for f in range(LENGTH)]
+    merge, split = encounters(told(touching, [1, 2, 3, 4], [6]), same, 2, RATE, LENGTH - 1)
+    assert (merge["frame"], merge["reason"]) == (3, b"their cells touch, for 2.0 s")
+    assert split["frame"] == 13
+
+
+def test_encounters_are_under_new_names_and_never_with_oneself() -> None:
+    touching = [{(0, 1), (2, 3)} if f < 10 else set() for f in range(LENGTH)]
+    rows = told(touching, [1, 2, 3, 4], [5])
+
+    def name(track: int, frame: int) -> int:
+        return {1: 9 if frame < 5 else 6, 2: 2, 3: 8, 4: 8}[track]
+
+    found = encounters(rows, name, 2, RATE, LENGTH - 1)
+    assert [(f, i, o) for f, kind, i, o, _ in found.tolist() if kind == b"merge"] == [(0, 2, 9), (5, 2, 6)]
+    assert not len(encounters(rows, lambda _, __: 0, 2, RATE, LENGTH - 1))
+
+
+# The area
+
+
+FIRST, PLACES = 7, [(0.1, 0.0), (-0.2, 0.5), (1.02, 0.2), (-0.4, -1.01)]
+TRIANGLE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)])
+
+
+def rig_of_area(polygon: Floats | None = None, closed: bool = False) -> Rig:
+    grid = Grid(x=(-1.0, 1.0), y=(-1.0, 1.0), planes=2, polygon=polygon)
+    return replace(room(), grid=grid, closed=closed)
+
+
+def commit_of(rig: Rig) -> Commit:
+    """Two frames in each of which tracks 1, 2, ... are at PLACES, and have a cell each."""
+    rows = np.zeros(2 * len(PLACES), TRAJECTORY)
+    rows["frame"] = np.repeat([FIRST, FIRST + 1], len(PLACES))
+    rows["id"] = np.tile(np.arange(1, len(PLACES) + 1), 2)
+    rows["x"], rows["y"] = np.tile(np.array(PLACES), (2, 1)).T
+    rows["x"][-2] = 0.98  # in its second frame the third is back
+    label = np.zeros((2, *rig.grid.shape), np.int32)
+    label[:, 0, 0, : len(PLACES)] = np.arange(1, len(PLACES) + 1)
+    nobody, empty = found(people()), SparseVolume.whole(np.zeros(rig.grid.shape, np.float32))
+    frames = [FusedFrame(frame, nobody, nobody, empty) for frame in (FIRST, FIRST + 1)]
+    return Commit(frames, label, rows, np.zeros(0, EVENT), np.zeros(0, WINDOW))
+
+
+@pytest.mark.parametrize(
+    ("polygon", "closed", "inside"),
+    [
+        (None, False, [[1, 2], [1, 2, 3]]),
+        (TRIANGLE, False, [[1], [1, 3]]),
+        (None, True, [[1, 2, 3, 4], [1, 2, 3, 4]]),
+    ],
+    ids=["rectangle", "polygon", "closed"],
+)
+def test_rows_and_labels_are_of_people_inside(polygon: Floats | None, closed: bool, inside: list[list[int]]) -> None:
+    rig = rig_of_area(polygon, closed)
+    whole = commit_of(rig)
+    kept = within_area(whole, rig)
+    for k, ids in enumerate(inside):
+        rows = kept.trajectory[kept.trajectory["frame"] == FIRST + k]
+        assert rows["id"].tolist() == ids
+        assert np.setdiff1d(kept.label[k], [0]).tolist() == ids
+    assert np.setdiff1d(whole.label, [0]).tolist() == [1, 2, 3, 4]  # what a tracker holds is not changed
+
+
+def test_who_walks_out_is_tracked_up_to_the_border() -> None:
+    rig = replace(room(), frame_rate=10.0)
+    edge, tracker, results = rig.grid.x[1], Tracker(rig), []
+    places = [np.array([[edge - 0.8 + 0.05 * frame, 0.3, 1.7], [0.2, -0.9, 1.7]]) for frame in range(26)]
+    for standing in places:
+        views: list[Observation] = [boxes(camera, standing) for camera in rig.cameras]
+        results += tracker.add(views)
+    results += tracker.finish()
+    rows = np.concatenate([result.trajectory for result in results])
+    assert rig.grid.contains(np.stack([rows["x"], rows["y"]], -1)).all()
+    walker = rows[rows["y"] > 0]
+    true = np.array([standing[0, 0] for standing in places])
+    assert walker["frame"].tolist() == np.flatnonzero(true < edge - 0.025).tolist()

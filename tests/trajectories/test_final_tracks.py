@@ -1,14 +1,21 @@
-"""The tracks of a whole run: events told again, tracks dropped, long gaps kept, raw places beside the smoothed."""
+"""The tracks of a whole run: events, dropped tracks, coincident tracks, and smoothed paths."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
-from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
+from hypothesis import strategies as st
+from scipy.spatial.distance import cdist
+from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
+from strategies import numbers
 
-from stseg.arrays import Rows
+from stseg.arrays import Floats, Ints, Rows
+from stseg.config import MotionConfig
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
+from stseg.trajectories.coincidence import coincident
 from stseg.trajectories.final_tracks import FinalTracks, final_tracks
+from stseg.trajectories.smoother import smooth_places, smoothed_paths
 
 
 def committed(rows: Rows) -> Rows:
@@ -127,3 +134,164 @@ def test_any_run_is_told_without_contradiction(drawn: Rows) -> None:
 def test_nobody_at_all() -> None:
     found = whole(np.zeros(0, TRAJECTORY), told())
     assert len(found.trajectory) == len(found.events) == len(found.identity) == 0
+
+
+# Coincidence
+
+
+COINCIDENCE_RATE = 10.0
+
+
+def walk(track: int, first: int, stop: int, y: float, score: float) -> Rows:
+    """A track along x, 0.1 m a frame."""
+    rows = np.zeros(stop - first, TRAJECTORY)
+    rows["frame"], rows["id"], rows["score"] = np.arange(first, stop), track, score
+    rows["x"], rows["y"] = 0.1 * rows["frame"], y
+    return rows
+
+
+def test_the_weaker_of_two_coincident_tracks_is_dropped() -> None:
+    rows = np.concatenate([walk(1, 0, 60, 0.0, 5.0), walk(2, 20, 45, 0.1, 3.0), walk(3, 0, 60, 0.6, 1.0)])
+    repeats, events = coincident(rows, COINCIDENCE_RATE, 1.0)
+    assert set(rows["id"][repeats]) == {2} and repeats.sum() == 25
+    (event,) = events
+    assert (event["frame"], event["kind"], event["id"], event["other"]) == (20, b"dropped", 2, 1)
+    assert event["reason"] == b"in one place with track 1 for 2.5 s: one person"
+
+
+@pytest.mark.parametrize(("y", "length"), [(0.1, 9), (0.25, 40)])
+def test_brief_encounters_and_neighbours_stay(y: float, length: int) -> None:
+    rows = np.concatenate([walk(1, 0, 60, 0.0, 5.0), walk(2, 20, 20 + length, y, 3.0)])
+    repeats, events = coincident(rows, COINCIDENCE_RATE, 1.0)
+    assert not repeats.any() and not len(events)
+
+
+def test_no_track_and_rows_in_any_order() -> None:
+    assert not len(coincident(np.zeros(0, TRAJECTORY), COINCIDENCE_RATE, 1.0)[0])
+    rows = np.concatenate([walk(2, 0, 30, 0.1, 9.0), walk(1, 0, 30, 0.0, 5.0)])
+    shuffled = rows[np.random.default_rng(1).permutation(len(rows))]
+    repeats, _ = coincident(shuffled, COINCIDENCE_RATE, 1.0)
+    assert set(shuffled["id"][repeats]) == {1} and repeats.sum() == 30
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_after_it_no_two_tracks_share_a_place_for_a_second(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows = np.concatenate([walk(k, 0, 50, rng.uniform(0, 1), rng.normal()) for k in range(1, 7)])
+    left = rows[~coincident(rows, COINCIDENCE_RATE, 1.0)[0]]
+    places = left[left["frame"] == 25]
+    apart = cdist(places["y"][:, None], places["y"][:, None]) + np.diag(np.full(len(places), np.inf))
+    assert apart.min(initial=np.inf) >= 0.12
+
+
+# Smoothed paths
+
+
+SMOOTHER_RATE = 8.0
+MOTION = MotionConfig()
+PACE = 0.8
+
+
+def conditioned(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """The same, as one joint Gaussian of all places of one path, conditioned on all measurements at once.
+
+    The first place is known by its measurement alone, so the prior is written relative to it: place at t is
+    first + t v + the twice integrated white noise, whose covariance at s <= t is turn^2 s^2 (3 t - s) / 6.
+    """
+    n, since = len(seconds), seconds - seconds[0]
+    early, late = np.minimum.outer(since, since), np.maximum.outer(since, since)
+    along = MOTION.velocity_noise**2 * early**2 * (3 * late - early) / 6 + PACE**2 * np.outer(since, since)
+    prior = np.kron(along, np.eye(2)) + np.kron(np.ones((n, n)), noise[0])
+    measured = np.zeros((2 * n - 2, 2 * n))
+    measured[:, 2:] = np.eye(2 * n - 2)
+    error = np.zeros((2 * n - 2, 2 * n - 2))
+    for k, own in enumerate(noise[1:]):
+        error[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = own
+    gain = prior @ measured.T @ np.linalg.inv(measured @ prior @ measured.T + error)
+    mean = np.tile(ground[0], n)
+    mean = mean + gain @ (ground[1:].ravel() - measured @ mean)
+    covariance = prior - gain @ measured @ prior
+    return mean.reshape(n, 2), np.stack([covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in range(n)])
+
+
+@st.composite
+def measured(draw: st.DrawFn) -> tuple[Ints, Floats, Floats]:
+    """Uneven frames, places and their covariances."""
+    frames = np.array(sorted(draw(st.sets(st.integers(0, 40), min_size=1, max_size=12))))
+    rng = np.random.default_rng(draw(st.integers(0, 9999)))
+    ground = rng.normal(0, 2, (len(frames), 2))
+    root = rng.normal(0, draw(numbers(0.05, 0.3)), (len(frames), 2, 2))
+    return frames, ground, root @ root.transpose(0, 2, 1) + 1e-3 * np.eye(2)
+
+
+@settings(deadline=None)
+@given(measured())
+def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Floats, Floats]) -> None:
+    frames, ground, noise = path
+    places, spread = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, [np.arange(len(frames))], MOTION)
+    expected, covariance = conditioned(frames / SMOOTHER_RATE, ground, noise)
+    np.testing.assert_allclose(places, expected, atol=1e-9, rtol=0)
+    np.testing.assert_allclose(spread, covariance, atol=1e-9, rtol=0)
+
+
+@settings(deadline=None)
+@given(measured())
+def test_smoothing_never_knows_less(path: tuple[Ints, Floats, Floats]) -> None:
+    frames, ground, noise = path
+    _, spread = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, [np.arange(len(frames))], MOTION)
+    assert (np.linalg.eigvalsh(spread) > 0).all()
+    assert (np.linalg.eigvalsh(noise - spread) > -1e-9).all()
+
+
+def test_a_single_measurement_stays_what_it_is() -> None:
+    ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
+    places, spread = smoothed_paths(np.array([3.0]), ground, noise, [np.arange(1)], MOTION)
+    np.testing.assert_array_equal(places, ground)
+    np.testing.assert_array_equal(spread, noise)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
+    """Two people at once, one of them seen in every third frame only; raw places stay."""
+    rng = np.random.default_rng(seed)
+    rows = np.zeros(80, TRAJECTORY)
+    rows["frame"][:60], rows["id"][:60] = range(60), 4
+    rows["frame"][60:], rows["id"][60:] = range(0, 60, 3), 2
+    seconds = rows["frame"] / SMOOTHER_RATE
+    true = np.column_stack([-3 + 0.8 * seconds, np.where(rows["id"] == 4, 1 - 0.2 * seconds, 2.0)])
+    rows["xx"] = rows["yy"] = 0.1**2
+    rows["raw_x"], rows["raw_y"] = (true + rng.normal(0, 0.1, true.shape)).T
+    rows["x"], rows["y"], rows["height"] = rows["raw_x"], rows["raw_y"], 1.7
+    rows = rows[np.lexsort((rows["id"], rows["frame"]))]
+    true = true[np.lexsort((np.repeat([4, 2], [60, 20]), np.concatenate([np.arange(60), np.arange(0, 60, 3)])))]
+    before = rows.copy()
+    smoothed = smooth_places(rows, SMOOTHER_RATE, MOTION)
+    np.testing.assert_array_equal(rows, before)
+    for name in ("frame", "id", "raw_x", "raw_y", "height"):
+        np.testing.assert_array_equal(smoothed[name], rows[name])
+    for identity, share in ((4, 0.7), (2, 0.95)):
+        own = rows["id"] == identity
+        raw, now = (
+            float(np.hypot(*(np.column_stack([table[x], table[y]])[own] - true[own]).T).mean())
+            for table, x, y in ((rows, "raw_x", "raw_y"), (smoothed, "x", "y"))
+        )
+        assert now < share * raw
+        assert (smoothed["xx"][own] < 0.1**2).all()
+
+
+@settings(deadline=None)
+@given(measured(), measured())
+def test_paths_smoothed_at_once_are_as_each_alone(
+    one: tuple[Ints, Floats, Floats], other: tuple[Ints, Floats, Floats]
+) -> None:
+    frames, ground, noise = (np.concatenate(pair) for pair in zip(one, other, strict=True))
+    tracks = np.split(np.arange(len(frames)), [len(one[0])])
+    both = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, tracks, MOTION)
+    for rows in tracks:
+        alone = smoothed_paths(frames[rows] / SMOOTHER_RATE, ground[rows], noise[rows], [np.arange(len(rows))], MOTION)
+        np.testing.assert_array_equal(both[0][rows], alone[0])
+        np.testing.assert_array_equal(both[1][rows], alone[1])
+
+
+def test_no_rows_are_smoothed() -> None:
+    assert len(smooth_places(np.zeros(0, TRAJECTORY), SMOOTHER_RATE, MOTION)) == 0

@@ -1,4 +1,4 @@
-"""Calibrated probability of cells."""
+"""Forgetting sums, reliability of cells, and distance from the border."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from run_files import small_volume, write_small_run
+from scenes import room
 from scipy.special import expit
 
 from stseg.geometry import Grid
 from stseg.io.runfile.runs import read_run
+from stseg.records.border import Border
 from stseg.records.cell_reliability import (
     LOG_ODDS_KNOTS,
     CellCounts,
@@ -19,6 +21,44 @@ from stseg.records.cell_reliability import (
     doubtful_cells,
     filled_cells,
 )
+from stseg.records.forgetting import Forgetting
+
+
+def test_memory_is_in_seconds_and_at_least_some_frames() -> None:
+    for rate, memory, least, frames in ((10.0, 2.0, 0.0, 20), (10.0, 0.1, 3.0, 3)):
+        forgetting = Forgetting((2,), rate, memory, least)
+        forgetting.add(np.array([1.0, 2.0]))
+        for _ in range(frames):
+            forgetting.forget()
+        np.testing.assert_allclose(forgetting.sums, np.exp(-1) * np.array([1.0, 2.0]))
+
+
+def test_skipped_frames_count_with_the_next() -> None:
+    skipped, whole = (Forgetting((1,), 10.0, 1.0) for _ in range(2))
+    for forgetting in (skipped, whole):
+        forgetting.add(np.ones(1))
+    for _ in range(3):
+        skipped.skip_frame()
+    skipped.forget()
+    whole.forget(frames=4)
+    np.testing.assert_array_equal(skipped.sums, whole.sums)
+    assert skipped.seconds(np.ones(1)) == whole.seconds(np.ones(1)) == pytest.approx(0.4)
+    skipped.forget()
+    assert skipped.seconds(np.ones(1)) == pytest.approx(0.1)
+
+
+def test_rows_are_forgotten_by_themselves() -> None:
+    forgetting = Forgetting((2, 3), 5.0, 1.0)
+    forgetting.add(np.ones((2, 3)))
+    forgetting.forget(1)
+    forgetting.add(np.ones(3), 1)
+    assert (forgetting.sums[0] == 1.0).all()
+    assert (forgetting.sums[1] > 1.0).all()
+    np.testing.assert_array_equal(forgetting.with_prior(2.0, np.ones(3))[0], 3.0)
+
+
+# Reliability of cells
+
 
 GRID = Grid((-1.0, 1.0), (-1.0, 1.0), 0.1, 1.8, 10)
 
@@ -75,3 +115,17 @@ def test_of_a_run_file(tmp_path: Path) -> None:
     order = np.argsort(log_odds[seen])
     assert (np.diff(probability[seen][order]) >= 0).all()
     assert 0 < probability[seen].mean() < 1
+
+
+# The border
+
+
+def test_points_have_the_distance_of_their_cell() -> None:
+    border = Border.of(room())
+    grid, (rows, columns) = border.grid, border.distance.shape
+    ground = grid.ground.reshape(-1, 2) + np.random.default_rng(0).uniform(-0.49, 0.49, (rows * columns, 2)) * grid.cell
+    np.testing.assert_array_equal(border.away(ground), border.distance.reshape(-1))
+    (left, right), (low, high) = grid.x, grid.y
+    out = np.array([[left - 0.01, 0], [right + 0.01, 0], [0, low - 0.01], [0, high + 0.01], [-1e30, 1e30]])
+    np.testing.assert_array_equal(border.away(out), 0.0)
+    assert border.distance.max() > 1.0

@@ -1,0 +1,404 @@
+"""The search for the best set: exhaustively on small problems, merges and splits, and restarts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+import reference_core as reference
+from crafted_frames import in_rooms, random_frame
+from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, people, room
+
+from stseg.arrays import Boxes, Floats, Ints, Singles, ViewEvidence
+from stseg.bodies.outlines import outlines
+from stseg.detection.detector import Detector
+from stseg.detection.evidence.birth_lattice import lattice_candidates
+from stseg.detection.explanation import explained_frame
+from stseg.detection.prior import Prior
+from stseg.detection.score.set_state import set_state
+from stseg.detection.search.best_set import ENUMERATION_LIMIT
+from stseg.detection.search.groups import fill_groups, fill_interactions
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.detection.search.merge_moves import merged
+from stseg.detection.search.refined_people import refined_members
+from stseg.detection.search.restarts import restarted
+from stseg.evaluation.matching import distances, match
+from stseg.records.candidates import Candidates
+from stseg.records.people import Explanation
+from stseg.records.predicted_tracks import PredictedTracks
+
+
+@pytest.mark.parametrize("tracks", [0, 4])
+@pytest.mark.parametrize("seed", range(40))
+def test_no_single_move_helps(seed: int, tracks: int) -> None:
+    frame = random_frame(seed, 10, tracks)
+    start = [] if seed % 2 else [0, 3]
+    members = frame.best_set(start)
+    assert len(set(members)) == len(members)
+    score = frame.score(members) + 1e-6
+    assert score >= frame.score(start)
+    others = [i for i in range(10) if i not in members]
+    for leaving in members:
+        without = [i for i in members if i != leaving]
+        assert score >= frame.score(without)
+        rivals = [i for i in others if np.hypot(*(frame.ground[i] - frame.ground[leaving])) <= 0.7]
+        assert all(score >= frame.score([*without, i]) for i in rivals)
+    assert all(score >= frame.score([*members, i]) for i in others)
+
+
+@pytest.mark.parametrize("tracks", [0, 3])
+@pytest.mark.parametrize("seed", range(20))
+def test_of_few_candidates_the_best_set_is_found(seed: int, tracks: int) -> None:
+    frame = random_frame(seed, 7, tracks)
+    best = max(frame.score(chosen) for chosen in reference.subsets(7))
+    assert frame.score(frame.best_set()) == pytest.approx(best, abs=1e-6)
+
+
+@pytest.mark.parametrize("tracks", [0, 4])
+def test_of_more_candidates_swaps_find_the_best_set(tracks: int) -> None:
+    """Simple moves alone, which cannot trade one person for two, miss the best of some of these crafted frames."""
+    frames = [random_frame(seed, 10, tracks) for seed in range(20)]
+    best = np.array([max(f.score(s) for s in reference.subsets(10)) for f in frames])
+    efforts = ((0, 0), (4, ENUMERATION_LIMIT))
+    simple, swapped = (np.array([f.score(f.best_set((), *effort)) for f in frames]) for effort in efforts)
+    np.testing.assert_allclose(swapped, best, atol=1e-6)
+    assert (simple < best - 1e-6).any()
+    assert (simple > best - 2.6).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_groups_interact_within_and_their_scores_add_up(seed: int) -> None:
+    frame = in_rooms(random_frame(seed, 9, 2), 3)
+    problem = frame.problem()
+    interacts, group = np.empty((9, 9), bool), np.empty(9, np.int64)
+    fill_interactions(set_state(problem), interacts)
+    expected = [[i == j or reference.interact(i, j, problem) for j in range(9)] for i in range(9)]
+    np.testing.assert_array_equal(interacts, expected)
+    number = fill_groups(set_state(problem), group)
+    assert number == len(set(group.tolist())) >= 3
+    assert list(dict.fromkeys(group.tolist())) == list(range(number))
+    assert not interacts[group[:, None] != group].any()
+    rng = np.random.default_rng(seed)
+    for _ in range(5):
+        members = rng.permutation(9)[: rng.integers(1, 10)]
+        parts = [frame.score(members[group[members] == g]) for g in range(number)]
+        assert frame.score(members) == pytest.approx(sum(parts), abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_each_group_is_decided_by_itself(seed: int) -> None:
+    """The best set of nine candidates in three groups is found, though more than can be enumerated stand there."""
+    frame = in_rooms(random_frame(seed, 9), 3)
+    best = max(frame.score(s) for s in reference.subsets(9))
+    assert frame.score(frame.best_set()) == pytest.approx(best, abs=1e-6)
+
+
+# Merges and splits
+
+
+PAIRS = [(width, distance) for width in (1.0, 1.3, 1.6) for distance in (0.3, 0.4, 0.5, 0.59)]
+"""Width of a silhouette beside a common one, and distance of two members on it, metres."""
+
+
+@cache
+def detector(*kinds: str) -> Detector:
+    return Detector(room(), kinds or ["pixels"] * 4, FEW_HEIGHTS, BODY)
+
+
+def silhouettes(ground: Floats, width: float) -> list[Singles]:
+    """Views of the room's cameras of people 1.7 m high at ground (n, 2), so wide relative to the common silhouette."""
+    views = []
+    for view in detector().views:
+        raster = np.zeros(view.camera.size[::-1], np.float32)
+        tall, wide = np.full(len(ground), 1.7), np.full(len(ground), width)
+        for first, spans in zip(*outlines(view.table, ground, tall, 1, raster.shape[:2], wide)[:2], strict=True):
+            for k, (start, stop) in enumerate(spans):
+                raster[first + k, start:stop] = 1.0
+        views.append(raster)
+    return views
+
+
+def members_at(ground: Floats, views: list[Singles]) -> MapEstimate:
+    """An estimate with members of mean size at ground (n, 2)."""
+    own_detector = detector()
+    prior = Prior.of(None, own_detector.config, own_detector.body, own_detector.border)
+    evidence = own_detector.evidence(own_detector.observe(views), prior)
+    pool = Candidates(ground, np.full(len(ground), 1.7), np.full(len(ground), BODY.width_mean))
+    members = np.arange(len(ground))
+    return MapEstimate.of_search(evidence, pool, members).with_members(members)
+
+
+def pair(distance: float) -> Floats:
+    """Two places at a distance, about a point near the middle of the room; float64 (2, 2), metres."""
+    return np.asarray(np.array([[0.1, -0.2]]) + np.array([[-0.5], [0.5]]) * distance * np.array([[0.8, 0.6]]))
+
+
+@pytest.mark.parametrize("distance", [0.3, 0.36, 0.42])
+def test_two_members_on_one_wide_silhouette_become_one_body(distance: float) -> None:
+    before = members_at(pair(distance), silhouettes(pair(0.0)[:1], 1.5))
+    after = merged(before)
+    assert len(after.members) == 1
+    body = after.pool.at(after.members)
+    assert np.hypot(*(body.ground[0] - pair(0.0)[0])) < 0.15
+    assert body.width[0] > BODY.width_mean + BODY.width_spread
+    assert after.members_score.total > before.members_score.total
+
+
+@pytest.mark.parametrize("distance", [0.45, 0.5, 0.55])
+def test_two_people_side_by_side_stay_two(distance: float) -> None:
+    before = members_at(pair(distance), silhouettes(pair(distance), 1.0))
+    np.testing.assert_array_equal(merged(before).members, before.members)
+
+
+def test_two_people_half_a_metre_apart_are_found_as_two() -> None:
+    standing = np.column_stack([pair(0.5), [1.7, 1.7]])
+    found = detector().explain(likelihoods(room().cameras, standing), None).people.ground
+    assert len(found) == 2
+    away = np.hypot(*np.moveaxis(standing[:, None, :2] - found, -1, 0))
+    assert away.min(0).max() < 0.12 and away.min(1).max() < 0.12
+
+
+def test_a_third_person_is_no_part_of_a_merge() -> None:
+    ground = np.concatenate([pair(0.3), [[1.2, 1.0]]])
+    views = [
+        np.maximum(*both) for both in zip(silhouettes(ground[2:], 1.0), silhouettes(pair(0.0)[:1], 1.5), strict=True)
+    ]
+    after = merged(members_at(ground, views))
+    assert len(after.members) == 2 and 2 in after.members
+
+
+@pytest.mark.parametrize(("width", "distance"), PAIRS)
+def test_a_merge_is_the_better_of_both_sets_by_the_plain_score(width: float, distance: float) -> None:
+    before = members_at(pair(distance), silhouettes(pair(0.0)[:1], width))
+    after = merged(before)
+    leading = before.members_score.view_evidence.sum(0).argmax()
+    alone = refined_members(before.with_members(before.members[[leading]])).pool
+    np.testing.assert_array_equal(after.pool.ground[2], alone.ground[0])
+    sets = ([0, 1], [2], [3])  # both; one at the leading member's place; one between them
+    scores = [reference.set_score(members, after.problem) for members in sets]
+    assert after.members.tolist() == sets[int(np.argmax(scores))]
+    assert after.members_score.total == pytest.approx(max(scores), abs=1e-3)
+
+
+def test_members_far_apart_and_members_in_boxes_are_left_alone() -> None:
+    far = members_at(pair(0.7), silhouettes(pair(0.7), 1.0))
+    assert merged(far) is far
+    own_detector = detector(*["boxes"] * 4)
+    views = [boxes(camera, np.column_stack([pair(0.5), [1.7, 1.7]])) for camera in room().cameras]
+    prior = Prior.of(None, own_detector.config, own_detector.body, own_detector.border)
+    evidence = own_detector.evidence(own_detector.observe(views), prior)
+    close_pair = MapEstimate.of_search(evidence, Candidates(pair(0.5), np.full(2, 1.7), np.full(2, 0.42)), np.arange(2))
+    assert len(close_pair.members) == 2
+    assert merged(close_pair) is close_pair
+
+
+# The hard core
+
+
+def test_the_hard_core_stands_where_a_view_delivers_pixels() -> None:
+    core = FEW_HEIGHTS.minimum_distance - 0.05
+    assert detector().parameters.hard_core == pytest.approx(core)
+    assert detector("pixels", "boxes", "boxes", "boxes").parameters.hard_core == pytest.approx(core)
+    assert detector(*["boxes"] * 4).parameters.hard_core == 0.0
+
+
+def nearest_pair(ground: Floats) -> float:
+    """Distance of the two nearest of some places, metres; infinite for fewer than two."""
+    distance = np.hypot(*np.moveaxis(ground[:, None] - ground, -1, 0)) + np.diag(np.full(len(ground), np.inf))
+    return float(distance.min(initial=np.inf))
+
+
+def crowd(seed: int) -> Floats:
+    """Six people about the middle of the room, some nearer to each other than bodies are wide."""
+    rng = np.random.default_rng(seed)
+    return np.column_stack([rng.uniform(-0.8, 0.8, (6, 2)), rng.uniform(1.6, 1.8, 6)])
+
+
+def twins(standing: Floats) -> PredictedTracks:
+    """Two predicted tracks for each person, 0.16 m apart."""
+    doubled = np.repeat(standing, 2, axis=0)
+    doubled[::2, 0] -= 0.08
+    doubled[1::2, 0] += 0.08
+    return expecting(*doubled)
+
+
+def dilated(raster: Singles) -> Singles:
+    """A map with foreground two pixels wider on all sides."""
+    return np.asarray(cv2.dilate(raster, np.ones((5, 5), np.uint8)), np.float32)
+
+
+def crowded(kinds: Sequence[str], seed: int) -> Iterator[tuple[Sequence[ViewEvidence], PredictedTracks | None]]:
+    """A crowd in silhouettes that are too wide and in boxes: in a first frame, and with two tracks on each person."""
+    standing = crowd(seed)
+    masks = [dilated(raster) for raster in likelihoods(room().cameras, standing)]
+    views: list[ViewEvidence] = [
+        mask if kind == "pixels" else boxes(camera, standing)
+        for kind, mask, camera in zip(kinds, masks, room().cameras, strict=True)
+    ]
+    yield views, None
+    yield views, twins(standing)
+
+
+@pytest.mark.parametrize("observations", [4.0, 40.0])
+@pytest.mark.parametrize("kinds", [["pixels"] * 4, ["pixels", "boxes"] * 2], ids=["pixels", "mixed"])
+@pytest.mark.parametrize("seed", range(4))
+def test_no_two_members_stand_within_the_hard_core(
+    observations: float, kinds: list[str], seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Each view speaks for ten views in the second case, which outvote any cost of crowding but the core.
+    own_detector = Detector(room(), kinds, replace(FEW_HEIGHTS, effective_observations=observations), BODY)
+    final: list[Floats] = []
+
+    def recorded_explanation(estimate: MapEstimate) -> Explanation:
+        final.append(estimate.pool.ground[estimate.members])
+        return explained_frame(estimate)
+
+    monkeypatch.setattr("stseg.detection.detector.explained_frame", recorded_explanation)
+    for views, predicted in crowded(kinds, seed):
+        own_detector.explain(views, predicted)
+    assert len(final) == 2
+    for ground in final:
+        assert len(ground) > 2
+        assert nearest_pair(ground) >= own_detector.parameters.hard_core
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_two_refined_places_are_within_the_hard_core(seed: int) -> None:
+    own_detector = detector()
+    for views, predicted in crowded(["pixels"] * 4, seed):
+        assert nearest_pair(own_detector.explain(views, predicted).people.ground) >= own_detector.parameters.hard_core
+
+
+# Restarts
+
+
+@cache
+def box_detector() -> Detector:
+    return Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
+
+
+def separate_places(rng: np.random.Generator, number: int, least: float) -> Floats:
+    standing = list[Floats]()
+    while len(standing) < number:
+        place = rng.uniform(-1.6, 1.6, 2)
+        if all(np.hypot(*(place - other)) > least for other in standing):
+            standing.append(place)
+    return np.array(standing)
+
+
+def misplaced_tracks(rng: np.random.Generator, ground: Floats) -> PredictedTracks:
+    """Tracks of people, the first three beside where they stand."""
+    predicted = ground.copy()
+    predicted[:3] += rng.normal(0, 0.6, (3, 2))
+    return expecting(*predicted.clip(-1.7, 1.7))
+
+
+def box_crowd(seed: int) -> tuple[Floats, list[Boxes], PredictedTracks]:
+    """Eight people, three boxes in four of each, and tracks of which three went astray."""
+    rng = np.random.default_rng(seed)
+    ground = separate_places(rng, 8, 0.4)
+    views = [boxes(camera, people(*ground)) for camera in room().cameras]
+    views = [found.of(rng.random(len(found)) > 0.25) for found in views]
+    return ground, views, misplaced_tracks(rng, ground)
+
+
+def of_tracks(views: Sequence[Boxes | None], predicted: PredictedTracks) -> MapEstimate:
+    """The best set of the predicted tracks alone."""
+    rig_detector = box_detector()
+    prior = Prior.of(predicted, rig_detector.config, rig_detector.body, rig_detector.border)
+    evidence = rig_detector.evidence(rig_detector.observe(views), prior)
+    return MapEstimate.of_search(evidence, prior.pool(), np.arange(len(predicted)))
+
+
+@pytest.mark.parametrize("seed", [9, 19, 31])
+def test_people_are_found_whose_boxes_a_ghost_holds(seed: int) -> None:
+    ground, views, predicted = box_crowd(seed)
+    found = box_detector().explain(views, predicted).people
+    assert len(found) == len(ground)
+    assert len(match(distances(ground, found.ground), 0.3)[0]) == len(ground)
+
+
+@pytest.mark.parametrize("seed", [8, 31, 37])
+def test_key_frames_leave_the_set_of_misplaced_tracks(seed: int) -> None:
+    rng, rig = np.random.default_rng(seed), replace(room(), cameras=room().cameras[:2])
+    ground = separate_places(rng, 5, 0.5)
+    predicted = misplaced_tracks(rng, ground)
+    views = likelihoods(rig.cameras, people(*ground))
+    rig_detector, hits = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY), []
+    for frame in range(2):  # the first is a key frame
+        found = rig_detector.explain_next(rig_detector.new_estimates(), frame, views, predicted).people
+        hits.append(len(match(distances(ground, found.ground), 0.3)[0]))
+    assert hits[0] == len(ground) > hits[1]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_set_becomes_less_likely(seed: int) -> None:
+    _, views, predicted = box_crowd(seed)
+    before = of_tracks(views, predicted)
+    after = restarted(before, box_detector().lattice_ground)
+    assert after.members_score.total >= before.members_score.total
+
+
+def box_tables(estimate: MapEstimate) -> list[Floats | Ints]:
+    boxes = estimate.problem.boxes
+    return [boxes.match, boxes.boxes, *boxes.hiders, boxes.inside, boxes.visible_past]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_more_candidates_have_the_boxes_of_a_whole_pool(seed: int) -> None:
+    _, views, predicted = box_crowd(seed)
+    partly_blind: list[Boxes | None] = [views[0], None, *views[2:]]
+    before = of_tracks(partly_blind, predicted)
+    empty_set = before.with_members(before.members[:0])
+    peaks = lattice_candidates(empty_set, box_detector().lattice_ground)
+    found = before.with_more(peaks.at([0])).with_more(peaks)
+    whole = MapEstimate.of_search(before.evidence, found.pool, before.members)
+    assert len(found.pool) == len(before.pool) + 1 + len(peaks) > len(before.pool) + 2
+    np.testing.assert_array_equal(found.members, before.members)
+    for table, made_whole in zip(box_tables(found), box_tables(whole), strict=True):
+        np.testing.assert_array_equal(table, made_whole)
+    np.testing.assert_array_equal(found.problem.track_gain, whole.problem.track_gain)
+    searched = before.searched_with(peaks, before.members)
+    np.testing.assert_array_equal(
+        searched.members, MapEstimate.of_search(before.evidence, searched.pool, before.members).members
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_refined_places_are_those_without_a_cache(seed: int) -> None:
+    """Members who take other boxes, since others are gone, are not where they were."""
+    _, views, predicted = box_crowd(seed)
+    estimate = of_tracks(views, predicted)
+    refined_members(estimate)
+    for one in (estimate, estimate.with_members(estimate.members[::2])):
+        anew = replace(one, evidence=replace(one.evidence))
+        found, by_itself = refined_members(one), refined_members(anew)
+        np.testing.assert_array_equal(found.pool.ground, by_itself.pool.ground)
+        np.testing.assert_array_equal(found.covariance, by_itself.covariance)
+
+
+def test_more_candidates_have_the_pixels_of_a_whole_pool() -> None:
+    ground = separate_places(np.random.default_rng(3), 5, 0.5)
+    rig_detector = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    prior = Prior.of(expecting(*ground[:2]), rig_detector.config, rig_detector.body, rig_detector.border)
+    views = rig_detector.observe(likelihoods(room().cameras, people(*ground)))
+    before = MapEstimate.of_search(rig_detector.evidence(views, prior), prior.pool(), np.arange(2))
+    peaks = lattice_candidates(before, rig_detector.lattice_ground)
+    found = before.with_more(peaks.at([0])).with_more(peaks.at([1])).problem
+    whole = MapEstimate.of_search(before.evidence, before.pool.joined_with(peaks.at([0, 1])), before.members).problem
+    for table, made_whole in zip(found.pixels, whole.pixels, strict=True):
+        np.testing.assert_array_equal(table, made_whole)
+    for name in ("size_prior", "birth_cost", "track_gain", "ground", "breadth"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
+    assert len(found.ground) == 4
+
+
+def test_strong_members_are_not_searched_again() -> None:
+    views = [boxes(camera, people((-1, -1), (1, 1))) for camera in room().cameras]
+    before = of_tracks(views, expecting((-1, -1), (1, 1)))
+    assert (before.losses > 12).all()
+    assert restarted(before, box_detector().lattice_ground) is before

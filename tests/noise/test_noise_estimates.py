@@ -1,0 +1,350 @@
+"""Estimates of a run: noise of boxes, the population of bodies, and rims of silhouettes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import BODY, FEW_HEIGHTS, corner_cameras, expecting, found, likelihoods, people, rig_of, room
+from scipy.ndimage import maximum_filter
+
+from stseg.arrays import Boxes, Floats, Singles, ViewEvidence
+from stseg.bodies.box_fit import (
+    EDGE_GRAIN,
+    EFFECTIVE_OBSERVATIONS,
+    LOWER_EDGE_BELOW,
+    PRIOR_NOISE,
+    SCORE_KNOTS,
+    TOLERANCE,
+    WIDTH_OFFSET,
+    BoxNoise,
+    half_square,
+)
+from stseg.bodies.views import ViewObservation
+from stseg.config import BodyConfig, Config, DetectionConfig, ErrorRateConfig
+from stseg.detection.detector import Detector
+from stseg.engine.rig_body import with_body_of
+from stseg.errors import ConfigError, RigError
+from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source
+from stseg.io.recording.rig_text import format_rig
+from stseg.io.recording.rigs import parse_rig
+from stseg.noise.box_noise_estimate import BoxNoiseEstimate
+from stseg.noise.population_estimate import PopulationEstimate
+from stseg.noise.rim_estimate import RimEstimate, without_rim
+from stseg.records.people import People
+
+RATE = 5.0
+CONFIG = ErrorRateConfig(memory=1e6, prior_weight=2.0)
+
+
+def test_tolerance_of_boxes_follows_their_score() -> None:
+    tolerance, belief = PRIOR_NOISE.of(np.array([1.0, 0.6, 0.2]))
+    np.testing.assert_allclose(tolerance[0], TOLERANCE)
+    np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0, 1), max_size=5))
+def test_what_is_sharper_says_more(scores: list[float]) -> None:
+    score = np.array(scores)
+    tolerance, belief = PRIOR_NOISE.of(score)
+    sharper, more = BoxNoise(PRIOR_NOISE.spread / 2).of(score)
+    np.testing.assert_allclose(sharper, tolerance / 2)
+    np.testing.assert_allclose(more - belief, 4 * EFFECTIVE_OBSERVATIONS * np.log(2))
+
+
+def test_noise_begins_at_the_prior_and_forgets() -> None:
+    sharpening = BoxNoiseEstimate(RATE, replace(CONFIG, memory=1.0))
+    np.testing.assert_allclose(sharpening.noise.spread, PRIOR_NOISE.spread)
+    taught(sharpening, 0.01, 1.0, 20)
+    learned = sharpening.noise.spread[-1]
+    assert (np.delete(learned, WIDTH_OFFSET) < np.delete(PRIOR_NOISE.spread[-1], WIDTH_OFFSET)).all()
+    for _ in range(50):
+        sharpening.offsets.forget()
+    np.testing.assert_allclose(sharpening.noise.spread[-1], PRIOR_NOISE.spread[-1], rtol=1e-3)
+
+
+def taught(sharpening: BoxNoiseEstimate, spread: float, score: float, frames: int) -> None:
+    """Boxes of three people in four views, edges off by so much of the height; every fourth ends far above the feet."""
+    rng, rig = np.random.default_rng(3), rig_of(corner_cameras())
+    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS, BODY)
+    standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7), (0.6, 0.8, 1.7))
+    for _ in range(frames):
+        seen = [shaken(view.table.boxes_of(*standing_of(standing)), spread, score, rng) for view in frame_pass.views]
+        explained = frame_pass.explain(seen, None)
+        sharpening.learn(explained, frame_pass.views, frame_pass.observe(seen))
+
+
+def standing_of(standing: Floats) -> tuple[Floats, Floats]:
+    return standing[:, :2], standing[:, 2]
+
+
+def shaken(bodies: Floats, spread: float, score: float, rng: np.random.Generator) -> Boxes:
+    tall = bodies[:, 3] - bodies[:, 1] + EDGE_GRAIN[: LOWER_EDGE_BELOW + 1, None]
+    middle, wide, head, foot = rng.normal(0, spread, (4, len(bodies))) * tall
+    left, right = bodies[:, 0] + middle - wide / 2, bodies[:, 2] + middle + wide / 2
+    top, bottom = bodies[:, 1] + head, bodies[:, 3] + foot
+    return Boxes(np.column_stack([left, top, right - left, bottom - top]), np.full(len(bodies), score))
+
+
+@pytest.mark.parametrize("spread", [0.015, 0.04])
+def test_the_spread_of_boxes_is_found(spread: float) -> None:
+    sharpening = BoxNoiseEstimate(RATE, CONFIG)
+    taught(sharpening, spread, 1.0, 60)
+    learned, loosest = sharpening.noise.spread, np.delete(PRIOR_NOISE.spread[-1], WIDTH_OFFSET)
+    # An edge counts as half a look, so places are less sure than such independent edges make them, and spreads wider.
+    found, true = np.delete(learned[-1], WIDTH_OFFSET), np.minimum(spread, loosest)
+    assert ((found > 0.8 * true) & (found < 2.2 * true)).all()
+    np.testing.assert_allclose(learned[:-2], PRIOR_NOISE.spread[:-2])
+
+
+def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
+    sharpening = BoxNoiseEstimate(RATE, CONFIG)
+    taught(sharpening, 0.1, 1.0, 30)
+    learned = sharpening.noise.spread
+    assert (learned <= PRIOR_NOISE.spread).all()
+    np.testing.assert_array_equal(learned[:, WIDTH_OFFSET], PRIOR_NOISE.spread[:, WIDTH_OFFSET])
+
+
+def test_only_knots_beside_a_score_learn_of_it() -> None:
+    sharpening = BoxNoiseEstimate(RATE, CONFIG)
+    taught(sharpening, 0.02, 0.7, 10)
+    changed = ~np.isclose(sharpening.noise.spread, PRIOR_NOISE.spread).all(1)
+    np.testing.assert_array_equal(changed, np.isin(SCORE_KNOTS, (0.6, 0.8)))
+
+
+def test_a_boxs_distance_is_measured_by_its_own_tolerance() -> None:
+    body, off = np.array([40.0, 10.0, 60.0, 60.0]), np.array([42.0, 12.0, 62.0, 63.0])
+    tight, loose = (half_square(body, off, factor * TOLERANCE, 128.0, 96.0) for factor in (1, 2))
+    assert tight == pytest.approx(4 * loose)
+
+
+def test_each_session_begins_with_the_first_guess() -> None:
+    rig = rig_of(corner_cameras())
+    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS, BODY)
+    standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7))
+    rng = np.random.default_rng(0)
+    seen = [shaken(view.table.boxes_of(*standing_of(standing)), 0.02, 1.0, rng) for view in frame_pass.views]
+    learned = frame_pass.new_estimates()
+    frame_pass.explain_next(learned, 0, seen, None)
+    assert (learned.box_noise.offsets.sums[:, 0] > 0).any()
+    np.testing.assert_allclose(frame_pass.new_estimates().box_noise.noise.spread, PRIOR_NOISE.spread)
+
+
+# The population
+
+
+POPULATION_RATE = 8.0
+LASTING = ErrorRateConfig(memory=1e9)
+
+
+def sized(heights: list[float], widths: list[float], unresolved: float = 0.0, evidence: float = 6.0) -> People:
+    """People whose sizes a frame left open by a share of the default population's variance."""
+    n, body = len(heights), BodyConfig()
+    seen = found(people(*[(0.1 * k, 0.0) for k in range(n)]), evidence=evidence)
+    variances = (np.full(n, unresolved * spread**2) for spread in (body.height_spread, body.width_spread))
+    tall, wide = variances
+    return replace(seen, sizes=replace(seen.sizes, height=np.array(heights), height_variance=tall,
+                                       width=np.array(widths), width_variance=wide))  # fmt: skip
+
+
+def learned_body(frames: list[People], config: ErrorRateConfig = LASTING) -> BodyConfig:
+    estimate = PopulationEstimate(BodyConfig(), POPULATION_RATE, config)
+    for frame in frames:
+        estimate.learn(frame)
+    return estimate.body
+
+
+def test_means_and_spreads_by_the_formulas() -> None:
+    heights, body = np.array([1.0, 1.2, 1.8]), BodyConfig()
+    after = learned_body([sized(heights.tolist(), (0.25 * heights).tolist())] * 400)
+    weight, before = 400 / POPULATION_RATE, body.prior_weight
+    mean = (before * body.height_mean + weight * heights.sum()) / (before + 3 * weight)
+    spread = before * (body.height_spread**2 + (body.height_mean - mean) ** 2) + weight * ((heights - mean) ** 2).sum()
+    assert after.height_mean == pytest.approx(mean)
+    assert after.height_spread == pytest.approx(np.sqrt(spread / (before + 3 * weight)))
+    share = body.width_mean / body.height_mean
+    relative = (before * share + 3 * weight * 0.25) / (before + 3 * weight)
+    assert after.width_mean == pytest.approx(relative * mean)
+    assert after.width_spread >= body.width_spread
+
+
+def test_nothing_seen_teaches_nothing() -> None:
+    for frame in (sized([], []), sized([1.0], [0.2], unresolved=1.0), sized([1.0], [0.2], evidence=1.0)):
+        after = learned_body([frame] * 20)
+        np.testing.assert_allclose(
+            [after.height_mean, after.height_spread, after.width_mean, after.width_spread],
+            [1.7, 0.12, 0.42, 0.04],
+        )
+
+
+def test_people_alike_leave_the_least_spread_and_are_forgotten() -> None:
+    alike = sized([1.7, 1.7], [0.42, 0.42])
+    assert learned_body([alike] * 500).height_spread == BodyConfig().height_spread
+    small = [sized([1.0], [0.25])] * 200
+    config = ErrorRateConfig(memory=5.0)
+    assert learned_body(small, config).height_mean < 1.6
+    assert learned_body([*small, *[sized([], [])] * 400], config).height_mean == pytest.approx(1.7, abs=1e-3)
+
+
+def test_a_run_among_children_learns_their_height() -> None:
+    rig = room()
+    standing = {"children": [(-0.9, 0.4, 1.2), (0.6, -0.5, 1.15)], "adults": [(-0.9, 0.4, 1.72), (0.6, -0.5, 1.68)]}
+    means = {}
+    for who, places in standing.items():
+        asked = Detector(rig, ["pixels"] * 4, FEW_HEIGHTS, replace(BODY, heights=(1.1, 1.4, 1.7)))
+        estimates = asked.new_estimates()
+        for _ in range(40):
+            explained = asked.explain_next(estimates, 0, likelihoods(rig.cameras, people(*places)), None)
+        assert len(explained.people) == 2
+        means[who] = estimates.population.body.height_mean
+    assert means["children"] < 1.62
+    assert means["adults"] == pytest.approx(1.7, abs=0.04)
+
+
+def recording(body: BodyPrior) -> Recording:
+    cameras = corner_cameras()
+    sources = tuple(CameraSource(Source("masks", Path(f"{camera.name}.avi"))) for camera in cameras)
+    return Recording(Path("rig.toml"), rig_of(cameras), sources, body)
+
+
+def test_the_rigs_bodies_are_kept_in_its_file() -> None:
+    for body in (BodyPrior(), BodyPrior(height_mean=0.6), BodyPrior(0.6, 0.05, 0.5, 0.1)):
+        text = format_rig(recording(body), Path("rig.toml"))
+        assert ("[body]" in text) == (body != BodyPrior())
+        assert parse_rig(text, Path("rig.toml")).body == body
+
+
+@pytest.mark.parametrize(
+    ("line", "key"),
+    [
+        ("height_mean = -1", "height_mean"),
+        ("heights = 1", "heights"),
+        ("width_mean = 0.3\nwidth_spread = 0.2", "width_spread"),
+    ],
+)
+def test_the_rigs_bodies_are_checked(line: str, key: str) -> None:
+    text = format_rig(recording(BodyPrior()), Path("rig.toml")) + f"\n[body]\n{line}\n"
+    with pytest.raises(RigError, match=key):
+        parse_rig(text, Path("rig.toml"))
+
+
+def test_the_configuration_precedes_the_rig_as_a_prior() -> None:
+    dogs = recording(BodyPrior(height_mean=0.6, width_mean=0.5))
+    assert with_body_of(recording(BodyPrior()), Config()) == Config()
+    body = with_body_of(dogs, Config()).body
+    assert (body.height_mean, body.width_mean) == (0.6, 0.5)
+    assert body.height_spread == pytest.approx(0.6 * 0.12 / 1.7)
+    assert with_body_of(dogs, Config()).detection.minimum_distance == pytest.approx(0.3 * 0.5 / 0.42)
+    told = Config(detection=DetectionConfig(minimum_distance=0.2))
+    assert with_body_of(dogs, told).detection.minimum_distance == 0.2
+    assert min(body.heights) < 0.6 < max(body.heights) < 0.8
+    configured = with_body_of(dogs, Config(body=BodyConfig(height_mean=0.9, heights=(0.8, 1.0)))).body
+    assert (configured.height_mean, configured.heights, configured.width_mean) == (0.9, (0.8, 1.0), 0.5)
+    with pytest.raises(ConfigError, match="height_mean"):
+        with_body_of(dogs, Config(body=BodyConfig(height_spread=0.4)))
+
+
+# Rims
+
+
+APART = ((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75))
+
+
+def shown(raster: Singles) -> ViewObservation:
+    none = np.zeros(0)
+    return ViewObservation(np.zeros((0, 4)), none, np.zeros((0, 5)), none, raster)
+
+
+def seen(standing: Floats, eaten: int) -> list[ViewEvidence]:
+    """Likelihoods of people, of whose edges some pixels are missing."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * eaten + 1,) * 2)
+    return [np.asarray(cv2.erode(view, disc), np.float32) for view in likelihoods(room().cameras, standing)]
+
+
+def learned_rims(standing: Floats, eaten: int, frames: int = 10, evidence: float = 20.0) -> RimEstimate:
+    return learned_from(seen(standing, eaten), standing, frames, evidence)
+
+
+def learned_from(
+    evidence_of_views: Sequence[ViewEvidence], standing: Floats, frames: int = 10, evidence: float = 20.0
+) -> RimEstimate:
+    asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    rims, here = asked.new_estimates().rims, replace(found(standing, evidence=evidence), height=standing[:, 2])
+    observations = asked.observe(evidence_of_views)
+    for _ in range(frames):
+        rims.learn(here, asked.views, observations)
+    return rims
+
+
+def test_background_beside_foreground_says_less() -> None:
+    raster = np.random.default_rng(5).normal(-1.0, 1.0, (17, 23)).astype(np.float32)
+    beside = (maximum_filter(raster, 3) > 0) & (raster < 0)
+    assert 20 < beside.sum() < (raster < 0).sum()
+    expected = np.where(beside, raster * np.float32(0.25), raster)
+    np.testing.assert_array_equal(without_rim(shown(raster), 0.75).raster, expected)
+
+
+def test_nothing_is_withdrawn_from_whole_silhouettes() -> None:
+    rims, raster = learned_rims(people(*APART), 0), np.full((3, 3), -1.0, np.float32)
+    assert rims.shares.sums[:, 0].min() > 1.0
+    np.testing.assert_array_equal(rims.withdrawn, 0.0)
+    whole = shown(raster)
+    assert without_rim(whole, 0.0) is whole
+
+
+def test_eaten_silhouettes_lose_their_rim() -> None:
+    weak, strong = (learned_rims(people(*APART), eaten).withdrawn for eaten in (1, 3))
+    assert (strong > 0.8).all()
+    assert (weak < strong).all()
+
+
+def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
+    rims = learned_rims(people(*APART), 2, frames=200)
+    weight, missing, rim = rims.shares.sums.T
+    left = (missing - rims.withdrawn * rim) / weight
+    np.testing.assert_allclose(left[rims.withdrawn < 1], FEW_HEIGHTS.pixel_miss_rate, atol=0.01)
+    assert (rims.withdrawn > 0).any()
+
+
+def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
+    alone = people((0.0, 0.0, 1.7))
+    eaten: list[ViewEvidence] = []
+    shifted: list[ViewEvidence] = []
+    for view in likelihoods(room().cameras, alone):
+        beside = np.roll(view, 2, axis=1)
+        shifted.append(beside)
+        eaten.append(np.minimum(view, beside))
+    assert (learned_from(eaten, alone).shares.sums[:, 1] > 1.5 * learned_from(shifted, alone).shares.sums[:, 1]).all()
+
+
+def test_a_view_without_people_takes_the_mean_of_the_others() -> None:
+    rims = learned_rims(people(*APART), 3)
+    every = rims.withdrawn
+    rims.shares.sums[2] = 0.0
+    assert rims.withdrawn[2] == pytest.approx(np.delete(every, 2).mean(), abs=0.1)
+    assert rims.withdrawn[2] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("standing", "evidence"), [([(0.0, 0.0, 1.7), (0.1, 0.1, 1.7)], 20.0), (list(APART), 1.0), ([], 20.0)]
+)
+def test_who_overlaps_or_is_doubted_teaches_nothing(standing: list[tuple[float, ...]], evidence: float) -> None:
+    np.testing.assert_array_equal(learned_rims(people(*standing), 3, evidence=evidence).shares.sums, 0.0)
+
+
+def test_learned_rims_raise_evidence_in_eaten_silhouettes() -> None:
+    standing = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
+    asked, evidence = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY), []
+    first = asked.new_estimates()
+    for known in (first, replace(first, rims=learned_rims(people(*APART), 1))):
+        explained = asked.explain_next(known, 0, seen(standing, 1), expecting(*standing))
+        assert len(explained.people) == len(standing)
+        evidence.append(explained.people.evidence.sum())
+    assert evidence[1] > evidence[0] + 2.0
