@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get
 from stseg.config import Config
 from stseg.config.keys import describe, is_user_key, values
 from stseg.errors import ConfigError
-from stseg.io.toml.text import parse_toml, toml_value
+from stseg.io.toml import parse_toml, toml_value
 from stseg.io.untrusted.values import abbreviated, finite_number, one_of
 
 _OPTION = "--set"

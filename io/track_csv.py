@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -49,7 +50,7 @@ def read_tracks_csv(path: Path) -> Rows:
         Where the file cannot be read, a column is missing, a cell is not a (whole, finite) number, or an id occurs
         twice in a frame; it names the line and the column.
     """
-    sheet = _read_sheet(path)
+    sheet = _read_sheet(Path(path))
     table = np.zeros(len(sheet.lines), POSITION)
     table["frame"] = sheet.whole("frame")
     sheet.refuse(np.abs(table["frame"]) > limits.FRAMES, "frame", f"a frame up to {limits.FRAMES}")
@@ -114,20 +115,45 @@ class _Sheet:
             raise FormatError(self.path, f"line {self.lines[row]}, column {column}", found.format(cell), expected)
 
 
-def _read_sheet(path: Path) -> _Sheet:
+def read_rows(
+    path: Path, needed: Sequence[str], most: int, *, skip_blanks: bool = False
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Header and first rows of a CSV file, each row with the number of its line.
+
+    Parameters
+    ----------
+    path
+        The file.
+    needed
+        Columns that the header must have.
+    most
+        Rows that are read.
+    skip_blanks
+        Whether blanks before a quotation mark are no part of the text.
+
+    Raises
+    ------
+    FormatError
+        Where the file cannot be read, or a column is missing.
+    """
     try:
-        require_regular(Path(path))
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
+        require_regular(path)
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file, skipinitialspace=skip_blanks)
             header = [name.strip() for name in next(reader, [])]
-            rows = [(reader.line_num, row) for row in islice(reader, limits.ROWS) if row]
+            rows = list(islice(((reader.line_num, row) for row in reader if row), most))
     except OSError as error:
         raise FormatError(path, "", error.strerror or error, "a CSV file that can be read") from error
     except (ValueError, csv.Error) as error:
         raise FormatError(path, "", "something that is not text", "a CSV file") from error
-    if missing := [name for name in _NEEDED if name not in header]:
+    if missing := [name for name in needed if name not in header]:
         found = ",".join(header)[: limits.NAME] or "nothing"
-        raise FormatError(path, "header", found, f"columns {','.join(_NEEDED)} (no {', '.join(missing)})")
+        raise FormatError(path, "header", found, f"columns {','.join(needed)} (no {', '.join(missing)})")
+    return header, rows
+
+
+def _read_sheet(path: Path) -> _Sheet:
+    header, rows = read_rows(path, _NEEDED, limits.ROWS)
     for line, row in rows:
         if len(row) != len(header):
             raise FormatError(path, f"line {line}", f"{len(row)} cells", f"{len(header)}, as in the header")

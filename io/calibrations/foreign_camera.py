@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError, InputError
 from stseg.geometry import Lens
-from stseg.io.toml.table import Table
+from stseg.io.toml import Table
 from stseg.io.untrusted import limits
 
 MOST_DISTORTION = 8

@@ -11,10 +11,9 @@ import numpy as np
 from stseg.errors import CalibrationError, ConfigError, FormatError
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.matrices import read_pom, read_projection
-from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
-from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world_frame import World
+from stseg.io.calibrations.xml_files import read_opencv_xml, read_tsai_xml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name
 

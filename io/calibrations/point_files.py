@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.errors import FormatError
+from stseg.io.track_csv import read_rows
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name, parse_number
 
 _NEEDED = ("camera", "u", "v", "x", "y")
@@ -49,9 +47,13 @@ def read_points(path: Path) -> list[PointTable]:
         Where the file cannot be read, a column is missing, or a cell is no number.
     """
     rows: dict[str, list[tuple[int, list[float]]]] = {}
-    for line, row in _rows(path):
+    header, given = read_rows(path, _NEEDED, limits.POINTS + 1, skip_blanks=True)
+    if len(given) > limits.POINTS:
+        raise FormatError(path, "", f"more than {limits.POINTS} points", "no more")
+    for line, words in given:
+        row = dict(zip(header, words, strict=False))
         cells = [_number(path, line, name, row) for name in ("u", "v", "x", "y", "z")]
-        name = (row["camera"] or "").strip()
+        name = row.get("camera", "").strip()
         if not is_name(name):
             strange = abbreviated(name) if name else "nothing"
             raise FormatError(path, f"line {line}, column camera", strange, f"a camera's name: {EXPECTED}")
@@ -66,28 +68,8 @@ def read_points(path: Path) -> list[PointTable]:
     return tables
 
 
-def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
-    try:
-        require_regular(path)
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
-            header = [name.strip() for name in reader.fieldnames or []]
-            if missing := [name for name in _NEEDED if name not in header]:
-                found = ",".join(header)[: limits.NAME] or "nothing"
-                raise FormatError(path, "header", found, f"columns {','.join(_NEEDED)} (no {', '.join(missing)})")
-            reader.fieldnames = header
-            rows = [(reader.line_num, row) for row in islice(reader, limits.POINTS + 1)]
-            if len(rows) > limits.POINTS:
-                raise FormatError(path, "", f"more than {limits.POINTS} points", "no more")
-            return rows
-    except OSError as error:
-        raise FormatError(path, "", error.strerror or error, "a CSV file that can be read") from error
-    except (ValueError, csv.Error) as error:
-        raise FormatError(path, "", "something that is not text", "a CSV file") from error
-
-
 def _number(path: Path, line: int, column: str, row: dict[str, str]) -> float:
-    cell = (row.get(column) or "").strip()
+    cell = row.get(column, "").strip()
     if column == "z" and not cell:
         return 0.0
     number = parse_number(cell)

@@ -12,8 +12,7 @@ from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.io.calibrations.foreign_camera import ForeignCamera, ForeignTable, camera_from_pose
 from stseg.io.extras import load_extra
-from stseg.io.toml.table import ANY
-from stseg.io.toml.text import parse_toml
+from stseg.io.toml import ANY, parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
 from stseg.io.untrusted.values import parse_whole, printable

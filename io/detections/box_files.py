@@ -13,37 +13,17 @@ from typing import TextIO
 
 import numpy as np
 
-from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
+from stseg.io.detections.record import Detections
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
+from stseg.io.untrusted.numpy_files import read_npy
 from stseg.io.untrusted.values import parse_number
 
 _NEEDED = ("frame", "left", "top", "width", "height")
+_FEATURES = "a .npy array of numbers, one row a detection"
 _MOT = (0, 2, 3, 4, 5, 6)  # frame, (id), left, top, width, height, conf
-
-
-@dataclass(frozen=True, slots=True)
-class BoxTable:
-    """All boxes of one view."""
-
-    frames: int
-    """Number of frames; frames without boxes have no detections."""
-    frame: Ints
-    """int64 (n,): the frame of each box, from 0, rising."""
-    pixel: Floats
-    """float64 (n, 4): left, top, width, height."""
-    score: Floats
-    """float64 (n,): 0..1."""
-    row: Ints
-    """int64 (n,): which box of the file each is."""
-    features: Singles | None = None
-    """float32 (n, feature), or None: appearance features."""
-
-    def at(self, frame: int) -> Boxes:
-        """The boxes of one frame, in the file's order."""
-        start, stop = np.searchsorted(self.frame, (frame, frame + 1))
-        return Boxes(self.pixel, self.score, self.features).of(slice(start, stop))
 
 
 @dataclass(frozen=True)
@@ -63,8 +43,10 @@ class _Lines:
             raise FormatError(self.path, f"line {self.number[row]}", found, expected)
 
 
-def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> BoxTable:
-    """Boxes of a whole file.
+def read_boxes(
+    path: Path, first_frame: int = 0, frames: int | None = None, appearance: Path | None = None
+) -> Detections:
+    """Boxes of a whole file in the order of their frames, which count from 0.
 
     The first line decides between two forms. CSV begins with a header that names frame, left, top, width, height
     and, perhaps, score, in any order, among columns that are ignored. MOTChallenge lines have no header: frame, id,
@@ -78,6 +60,8 @@ def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> B
         Number of the first frame in the file.
     frames
         Number of frames; None to end with the last frame that has a box.
+    appearance
+        File of their appearance features; None without.
 
     Raises
     ------
@@ -99,7 +83,8 @@ def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> B
         found = f"more than {limits.BOXES_PER_FRAME} boxes in frame {frame[order][crowded[0]] + first_frame}"
         raise FormatError(path, "", found, "no more")
     length = int(frame.max()) + 1 if frames is None else frames
-    return BoxTable(length, frame[order], values[order, 1:5], score[order], order)
+    features = None if appearance is None else read_features(appearance, len(values))[order]
+    return Detections(frame[order], values[order, 1:5], score[order], frames=length, features=features)
 
 
 def _check(lines: _Lines, first_frame: int, frames: int | None) -> None:
@@ -201,3 +186,26 @@ def _numbers(path: Path, line: int, fields: list[str], columns: tuple[int, ...])
 
 def _is_number(text: str) -> bool:
     return not math.isnan(parse_number(text))
+
+
+def read_features(path: Path, detections: int) -> Singles:
+    """Features of the detections of one file, in its order, float32 (detection, feature).
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where the file cannot be read, or has another number of rows, or numbers that are not finite.
+    """
+    try:
+        array = read_npy(path)
+    except OSError as error:
+        raise SourceError(path, "", error.strerror or error, _FEATURES) from error
+    except ValueError as error:
+        raise FormatError(path, "", error, _FEATURES) from error
+    if array.ndim != 2 or array.dtype.kind not in "fiu" or not 1 <= array.shape[1] <= limits.FEATURES:
+        raise FormatError(path, "", f"an array of {array.dtype} {array.shape}", _FEATURES)
+    if len(array) != detections:
+        raise FormatError(path, "", f"{len(array)} rows", f"{detections}, one a detection")
+    if not (np.abs(array.astype(np.float64)) <= limits.NUMBER).all():
+        raise FormatError(path, "", "a number that is not finite, or huge", "finite numbers of usual size")
+    return array.astype(np.float32)

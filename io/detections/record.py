@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.masks import Mask
 from stseg.io.untrusted import limits
@@ -73,6 +73,11 @@ class Detections:
         features = None if self.features is None else self.features[index]
         frame, pixel, score = self.frame[index], self.pixel[index], self.score[index]
         return Detections(frame, pixel, score, label, mask, self.frames, features)
+
+    def at(self, frame: int) -> Boxes:
+        """The boxes of one frame, in the order of the rows; their frames must rise."""
+        start, stop = np.searchsorted(self.frame, (frame, frame + 1))
+        return Boxes(self.pixel, self.score, self.features).of(slice(start, stop))
 
     def classes(self) -> dict[str, int]:
         """Number of detections of each class, the most frequent first."""

@@ -10,21 +10,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Singles
 from stseg.errors import FormatError, SourceError
-from stseg.io.detections.box_files import BoxTable, read_boxes
+from stseg.io.detections.box_files import read_boxes, read_features
 from stseg.io.detections.formats import read_detections
 from stseg.io.detections.masks import Polygons
 from stseg.io.detections.record import Detections, Request
 from stseg.io.recording.recording import Recording, Source
-from stseg.io.untrusted import limits
-from stseg.io.untrusted.numpy_files import read_npy
 from stseg.records.principal_axes import principal_axes
 from stseg.records.tables import FEATURES
 
 _BOXES_OF_AXES = 20_000
 """Most boxes of a camera from which axes are learned."""
-_FEATURES = "a .npy array of numbers, one row a detection"
 
 
 @dataclass(frozen=True)
@@ -41,11 +38,10 @@ class SourceDetections:
     """Number of frames."""
 
     @property
-    def table(self) -> BoxTable:
-        """The kept boxes by frame."""
+    def table(self) -> Detections:
+        """The kept detections in the order of their frames."""
         order = np.argsort(self.kept.frame, kind="stable")
-        selected = self.kept.of(order)
-        return BoxTable(self.frames, selected.frame, selected.pixel, selected.score, order, selected.features)
+        return replace(self.kept.of(order), frames=self.frames)
 
 
 def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:
@@ -89,25 +85,15 @@ def _read(source: Source, size: tuple[int, int], _stamp_of_file: tuple[int, int]
     if recognised is None:
         if source.classes:
             raise SourceError(source.path, "classes", ", ".join(source.classes), "detections that have classes")
-        table = read_boxes(source.path, source.first_frame, source.frames)
-        found = Detections(table.frame + source.first_frame, table.pixel, table.score)
-        found = _with_features(found, table.row, source)
-        kept = found.of(found.score >= source.least_score)
-        return SourceDetections(
-            "boxes as text", found, replace(kept, frame=kept.frame - source.first_frame), table.frames
-        )
+        boxes = read_boxes(source.path, source.first_frame, source.frames, source.appearance)
+        found = replace(boxes, frame=boxes.frame + source.first_frame)
+        return SourceDetections("boxes as text", found, boxes.of(boxes.score >= source.least_score), boxes.frames or 0)
     name, found = recognised
-    found = _with_features(found, np.arange(len(found)), source)
+    if source.appearance is not None:
+        found = replace(found, features=read_features(source.appearance, len(found)))
     kept = found.of(_wanted(found, source.classes, source.least_score))
     kept = replace(kept, frame=kept.frame - source.first_frame)
     return SourceDetections(name, found, kept, _length(source, found, kept))
-
-
-def _with_features(found: Detections, row: Ints, source: Source) -> Detections:
-    """The detections with the appearance features that stand in `row` of the source's file of them."""
-    if source.appearance is None:
-        return found
-    return replace(found, features=read_features(source.appearance, len(found))[row])
 
 
 def _wanted(found: Detections, classes: Sequence[str], least_score: float) -> Flags:
@@ -174,26 +160,3 @@ def appearance_axes(recording: Recording) -> Floats | None:
         step = -(-len(features) // _BOXES_OF_AXES)
         samples.append(np.asarray(features[::step]))
     return principal_axes(samples, FEATURES) if samples else None
-
-
-def read_features(path: Path, detections: int) -> Singles:
-    """Features of the detections of one file, in its order, float32 (detection, feature).
-
-    Raises
-    ------
-    SourceError, FormatError
-        Where the file cannot be read, or has another number of rows, or numbers that are not finite.
-    """
-    try:
-        array = read_npy(path)
-    except OSError as error:
-        raise SourceError(path, "", error.strerror or error, _FEATURES) from error
-    except ValueError as error:
-        raise FormatError(path, "", error, _FEATURES) from error
-    if array.ndim != 2 or array.dtype.kind not in "fiu" or not 1 <= array.shape[1] <= limits.FEATURES:
-        raise FormatError(path, "", f"an array of {array.dtype} {array.shape}", _FEATURES)
-    if len(array) != detections:
-        raise FormatError(path, "", f"{len(array)} rows", f"{detections}, one a detection")
-    if not (np.abs(array.astype(np.float64)) <= limits.NUMBER).all():
-        raise FormatError(path, "", "a number that is not finite, or huge", "finite numbers of usual size")
-    return array.astype(np.float32)

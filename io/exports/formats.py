@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from stseg.io.exports import benchmarks, geographic, movement, pedestrians, tables
+from stseg.io.exports import benchmarks, geographic, movement, tables
 from stseg.io.runfile.reading.run_reader import Run
 
 
@@ -19,7 +19,7 @@ class ExportFormat:
     write: Callable[[Path, Run], None]
     """Writes a run's tracks to a path."""
     about: str
-    """What it is, for `stseg export --help`."""
+    """Description for `stseg export --help`."""
 
 
 FORMATS: Mapping[str, ExportFormat] = {
@@ -33,9 +33,9 @@ FORMATS: Mapping[str, ExportFormat] = {
         benchmarks.write_wildtrack, "a zip of WILDTRACK's annotations_positions, and the grid that they use"
     ),
     "pedpy": ExportFormat(
-        pedestrians.write_pedpy, "the text of PedPy and JuPedSim (PedPy reads the run file itself, too)"
+        movement.write_pedpy, "the text of PedPy and JuPedSim (PedPy reads the run file itself, too)"
     ),
-    "jupedsim": ExportFormat(pedestrians.write_jupedsim, "JuPedSim's SQLite trajectory"),
+    "jupedsim": ExportFormat(movement.write_jupedsim, "JuPedSim's SQLite trajectory"),
     "movement": ExportFormat(movement.write_movement, "netCDF of the package movement, places on the ground"),
     "movement-boxes": ExportFormat(movement.write_movement_boxes, "the same of the boxes in all views"),
     "mf-json": ExportFormat(geographic.write_moving_features, "OGC Moving Features JSON"),

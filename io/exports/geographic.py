@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 
 from stseg.arrays import Rows
+from stseg.io.exports.movement import rows_by_track
 from stseg.io.runfile.reading.run_reader import Run
 
 BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
@@ -34,7 +34,7 @@ def write_moving_features(path: Path, run: Run) -> None:
         "type": "FeatureCollection",
         "crs": {"type": "Name", "properties": {"name": GROUND}},
         "trs": {"type": "Name", "properties": {"name": _ISO_8601}},
-        "features": [_moving_point(run, track, rows) for track, rows in _by_track(run)],
+        "features": [_moving_point(run, run.tracks[k], rows) for k, rows in rows_by_track(run, run.trajectory)],
     }
     with path.open("w", newline="\n", encoding="utf-8") as file:
         json.dump(collection, file, allow_nan=False)
@@ -43,8 +43,8 @@ def write_moving_features(path: Path, run: Run) -> None:
 def write_geojson_lines(path: Path, run: Run) -> None:
     """Write newline-delimited GeoJSON: a line a track, a LineString, or a Point where it has one place."""
     with path.open("w", newline="\n", encoding="utf-8") as file:
-        for track, rows in _by_track(run):
-            places = _places(rows)
+        for k, rows in rows_by_track(run, run.trajectory):
+            track, places = run.tracks[k], _places(rows)
             geometry: dict[str, object] = {"type": "LineString", "coordinates": places}
             if len(places) == 1:
                 geometry = {"type": "Point", "coordinates": places[0]}
@@ -57,16 +57,6 @@ def write_geojson_lines(path: Path, run: Run) -> None:
             }
             feature = {"type": "Feature", "id": int(track["id"]), "geometry": geometry, "properties": properties}
             file.write(json.dumps(feature, allow_nan=False) + "\n")
-
-
-def _by_track(run: Run) -> Iterator[tuple[np.void, Rows]]:
-    """Each TRACK row with its TRAJECTORY rows in the order of time."""
-    table = run.trajectory[np.lexsort((run.trajectory["frame"], run.trajectory["id"]))]
-    starts = np.searchsorted(table["id"], run.tracks["id"], "left")
-    stops = np.searchsorted(table["id"], run.tracks["id"], "right")
-    for track, start, stop in zip(run.tracks, starts, stops, strict=True):
-        if stop > start:
-            yield track, table[start:stop]
 
 
 def _moving_point(run: Run, track: np.void, rows: Rows) -> dict[str, object]:

@@ -1,14 +1,15 @@
-"""Tracks as netCDF in the layout of `movement`, the package for the analysis of animals' movement.
+"""Tracks for the analysis of movement: PedPy, JuPedSim, and netCDF in the layout of the package `movement`.
 
-Its datasets since 0.17: `position` (time, space, keypoint, individual) of poses, `position` and `shape`
+The datasets of `movement` since 0.17: `position` (time, space, keypoint, individual) of poses, `position` and `shape`
 (time, space, individual) of boxes, `confidence` beside both; NaN where an individual is not there. Each individual has
 chunks of its own, so that the file holds no more than the tracks.
 """
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,22 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.io.extras import load_extra
+from stseg.io.runfile import layout
 from stseg.io.runfile.reading.run_reader import Run
 
 _LONGEST_CHUNK = 4096  # frames
+_JUPEDSIM_VERSION = 2  # PedPy refuses the area of version 3; JuPedSim reads both
+_MOTION_TOLERANCE = 1e-6  # metres
+_ONLY_AREA = 1  # its number among the areas of the recording; it does not change
+_JUPEDSIM_TABLES = """
+CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE geometry(hash INTEGER NOT NULL, wkt TEXT NOT NULL);
+CREATE UNIQUE INDEX geometry_hash ON geometry(hash);
+CREATE TABLE frame_data(frame INTEGER NOT NULL, geometry_hash INTEGER NOT NULL);
+CREATE TABLE trajectory_data(frame INTEGER NOT NULL, id INTEGER NOT NULL, pos_x REAL NOT NULL, pos_y REAL NOT NULL,
+    ori_x REAL NOT NULL, ori_y REAL NOT NULL);
+CREATE INDEX frame_id_idx ON trajectory_data(frame, id);
+"""
 
 
 def write_movement(path: Path, run: Run) -> None:
@@ -27,7 +41,7 @@ def write_movement(path: Path, run: Run) -> None:
     with _dataset(path, run, "poses", {"keypoint": ["ground"]}) as file:
         position = _variable(file, "position", ("time", "space", "keypoint", "individual"), "metres on the ground")
         confidence = _variable(file, "confidence", ("time", "keypoint", "individual"), "probability of a person")
-        for individual, rows in _by_id(run, run.trajectory):
+        for individual, rows in rows_by_track(run, run.trajectory):
             span, ground = _filled(run, rows, np.stack([rows["x"], rows["y"]], -1))
             position[span, :, 0, individual] = ground
             confidence[span, 0, individual] = _filled(run, rows, _probability(rows))[1]
@@ -42,8 +56,8 @@ def write_movement_boxes(path: Path, run: Run) -> None:
         axes = ("view", "time", "space", "individual")
         position, shape = _variable(file, "position", axes, "pixels"), _variable(file, "shape", axes, "pixels")
         confidence = _variable(file, "confidence", ("view", "time", "individual"), "probability of a person")
-        places = dict(_by_id(run, run.trajectory))
-        for individual, boxes in _by_id(run, run.boxes):
+        places = dict(rows_by_track(run, run.trajectory))
+        for individual, boxes in rows_by_track(run, run.boxes):
             for view in np.unique(boxes["view"]):
                 rows = boxes[boxes["view"] == view]
                 size = np.stack([rows["width"], rows["height"]], -1).astype(float)
@@ -83,7 +97,7 @@ def _variable(file: Any, name: str, axes: tuple[str, ...], long_name: str) -> An
     return variable
 
 
-def _by_id(run: Run, table: Rows) -> Iterator[tuple[int, Rows]]:
+def rows_by_track(run: Run, table: Rows) -> Iterator[tuple[int, Rows]]:
     """Rows of each track in the order of frames, with the track's number among the tracks."""
     table = table[np.lexsort((table["frame"], table["id"]))]
     starts, stops = (np.searchsorted(table["id"], run.tracks["id"], side) for side in ("left", "right"))
@@ -103,3 +117,51 @@ def _filled(run: Run, rows: Rows, values: Floats) -> tuple[slice, Floats]:
 def _probability(rows: Rows) -> Floats:
     """Log-odds in nats as probability, float64 (n,)."""
     return np.asarray(0.5 * (1 + np.tanh(0.5 * rows["score"].astype(float))))
+
+
+def write_pedpy(path: Path, run: Run) -> None:
+    """Write the text that PedPy and JuPedSim read: id, frame, x, y, z, metres, in the order of ids.
+
+    PedPy takes the first number of the line with `framerate` for the rate and the units from `x/m`, so that these two
+    comments say nothing else.
+    """
+    rate = np.format_float_positional(run.frame_rate, min_digits=2)
+    table = run.trajectory[np.lexsort((run.trajectory["frame"], run.trajectory["id"]))]
+    with path.open("w", newline="\n", encoding="utf-8") as file:
+        file.write(f"# framerate: {rate}\n# id frame x/m y/m z/m\n")
+        np.savetxt(file, table[["id", "frame", "x", "y", "z"]], fmt="%d %d %.4f %.4f %.4f")
+
+
+def write_jupedsim(path: Path, run: Run) -> None:
+    """Write JuPedSim's SQLite trajectory: the tracks, the frame rate, and the walkable area."""
+    grid, area = run.recording.rig.grid, layout.walkable_area(run.recording.rig.grid)
+    bounds = {"xmin": grid.x[0], "xmax": grid.x[1], "ymin": grid.y[0], "ymax": grid.y[1]}
+    about = {"version": _JUPEDSIM_VERSION, "fps": run.frame_rate, **bounds}
+    table = run.trajectory
+    columns = [table[name].tolist() for name in ("frame", "id", "x", "y")] + headings(table).T.tolist()
+    path.write_bytes(b"")  # SQLite would add to what is there
+    with closing(sqlite3.connect(path)) as database, database:
+        database.executescript(_JUPEDSIM_TABLES)
+        database.executemany("INSERT INTO metadata VALUES(?, ?)", [(key, str(value)) for key, value in about.items()])
+        database.execute("INSERT INTO geometry VALUES(?, ?)", (_ONLY_AREA, area))
+        database.executemany(
+            "INSERT INTO frame_data VALUES(?, ?)", [(frame, _ONLY_AREA) for frame in run.frames.tolist()]
+        )
+        database.executemany("INSERT INTO trajectory_data VALUES(?, ?, ?, ?, ?, ?)", zip(*columns, strict=True))
+
+
+def headings(table: Rows) -> Floats:
+    """Heading of each row's person, by central differences of positions, float64 (n, 2) of length 1.
+
+    People who stand still, or exist for one frame, face along x: JuPedSim requires a direction.
+    """
+    order = np.lexsort((table["frame"], table["id"]))
+    place, track = np.stack([table["x"], table["y"]], -1)[order], table["id"][order]
+    begins = np.append(True, np.diff(track) != 0)[: len(track)]
+    rows = np.arange(len(track))
+    way = place[np.where(np.roll(begins, -1), rows, rows + 1)] - place[np.where(begins, rows, rows - 1)]
+    length = np.hypot(*way.T)
+    still = length < _MOTION_TOLERANCE
+    heading = np.zeros((len(table), 2))
+    heading[order] = np.where(still[:, None], (1.0, 0.0), way / np.where(still, 1.0, length)[:, None])
+    return heading

@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.geometry import Camera
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source
-from stseg.io.toml.text import toml_string, toml_value
+from stseg.io.toml import toml_string, toml_value
 
 FORMAT = 1
 

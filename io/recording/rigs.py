@@ -28,8 +28,7 @@ from stseg.io.recording.recording import (
     SourceKind,
 )
 from stseg.io.recording.rig_text import FORMAT, format_rig
-from stseg.io.toml.table import ANY, Table
-from stseg.io.toml.text import parse_toml
+from stseg.io.toml import ANY, Table, parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
 

@@ -71,7 +71,7 @@ class CountedStream:
 def open_boxes(source: Source, camera: Camera) -> CountedStream:
     """Boxes of a file or folder of detections, read whole at once; raises as `open_stream` does."""
     table = read_source(source, camera.size).table
-    return CountedStream(table.frames, table.at)
+    return CountedStream(table.frames or 0, table.at)
 
 
 def open_masks(source: Source, camera: Camera) -> CountedStream:

@@ -21,7 +21,7 @@ from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
 from stseg.io.runfile.reading.hdf5_reading import read_attribute, read_text
-from stseg.io.toml.text import parse_toml
+from stseg.io.toml import parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.safe_hdf5 import read_whole
 from stseg.io.untrusted.values import printable
@@ -59,7 +59,7 @@ class Provenance:
     """The text of the rig file at `rig_path`, TOML."""
     rig_path: Path
     versions: Mapping[str, str]
-    """Of this package, Python and numerical libraries."""
+    """Versions of this package, Python and numerical libraries."""
     sources: Rows
     """SOURCE (n,)."""
     frame_at_tick: Mapping[str, Ints] = field(default_factory=dict)

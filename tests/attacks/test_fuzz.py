@@ -13,7 +13,7 @@ from fuzz.targets import TARGETS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stseg.io.toml.text import parse_toml
+from stseg.io.toml import parse_toml
 from stseg.io.untrusted.values import abbreviated, is_name, parse_number, parse_whole, printable
 
 FILES = 60

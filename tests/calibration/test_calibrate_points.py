@@ -19,8 +19,8 @@ from stseg.commands.calibrate.lens import calibrate_lens
 from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
 from stseg.geometry import Camera, Grid
 from stseg.geometry.fits import fit_homography, focal_of_square_pixels, middle_matrix, vertical_of_matrix
-from stseg.io.calibrations.opencv_xml import read_opencv_lens
 from stseg.io.calibrations.point_files import read_points
+from stseg.io.calibrations.xml_files import read_opencv_lens
 from stseg.io.recording.rigs import read_recording
 from stseg.tasks.calibration.points import fit_warnings
 

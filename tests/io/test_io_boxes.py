@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 from refusals import refused
 
 from stseg.errors import FormatError, SourceError
-from stseg.io.detections.box_files import BoxTable, read_boxes
+from stseg.io.detections.box_files import read_boxes
+from stseg.io.detections.record import Detections
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 
 
-def read(folder: Path, text: str, first_frame: int = 0, frames: int | None = None) -> BoxTable:
+def read(folder: Path, text: str, first_frame: int = 0, frames: int | None = None) -> Detections:
     path = folder / "boxes.txt"
     path.write_text(text, encoding="utf-8")
     return read_boxes(path, first_frame, frames)

@@ -23,8 +23,8 @@ from stseg.geometry import Camera
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.matrices import read_pom, read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
-from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, median_height, require_height
+from stseg.io.calibrations.xml_files import read_tsai_xml
 from stseg.io.recording.rigs import read_recording
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))

@@ -19,8 +19,8 @@ from stseg.errors import CalibrationError, ConfigError, FormatError, OutputError
 from stseg.geometry import Camera
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.matrices import read_projection
-from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.world_frame import Up, World
+from stseg.io.calibrations.xml_files import read_opencv_xml
 from stseg.io.recording.rigs import read_recording
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))

@@ -35,7 +35,7 @@ from stseg.io.detections.box_files import read_boxes
 from stseg.io.exports.benchmarks import wildtrack_positions, wildtrack_size
 from stseg.io.exports.formats import FORMATS
 from stseg.io.exports.geographic import BEGINNING
-from stseg.io.exports.pedestrians import headings
+from stseg.io.exports.movement import headings
 from stseg.io.extras import load_extra
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.records.tables import TRAJECTORY, Tracks

@@ -70,7 +70,7 @@ def test_ci_names_rooms_and_tools_that_exist() -> None:
 
 
 _BUILD = "import sys; from setuptools.build_meta import build_wheel; build_wheel(sys.argv[1])"
-_IMPORT = "import stseg.io.runfile.runs, stseg.io.calibrations.opencv_xml, stseg.engine.pipeline; print(stseg.__file__)"
+_IMPORT = "import stseg.io.runfile.runs, stseg.io.calibrations.xml_files, stseg.engine.pipeline; print(stseg.__file__)"
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_every_module_is_in_the_wheel(wheel: Path) -> None:
     names = {name for name in zipfile.ZipFile(wheel).namelist() if name.endswith((".py", "py.typed", ".yaml", ".js"))}
     modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.py")}
     behind_the_link = {f"stseg/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "io").rglob("*.py")}
-    assert {"stseg/io/track_csv.py", "stseg/io/calibrations/opencv_xml.py"} <= behind_the_link
+    assert {"stseg/io/track_csv.py", "stseg/io/calibrations/xml_files.py"} <= behind_the_link
     scripts = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.js")}
     assert "stseg/reporting/page/page.js" in scripts
     assert names == modules | behind_the_link | scripts | {"stseg/py.typed", "stseg/napari.yaml"}

@@ -12,7 +12,7 @@ from stseg.calibration.points.checkerboard import find_corners, fit_lens
 from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError
 from stseg.geometry import Camera
-from stseg.io.calibrations.opencv_xml import write_opencv_lens
+from stseg.io.calibrations.xml_files import write_opencv_lens
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream

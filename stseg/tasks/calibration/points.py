@@ -15,9 +15,9 @@ from stseg.calibration.points.point_requirements import require_height
 from stseg.engine.recordings import AnySource, camera_source
 from stseg.errors import ConfigError
 from stseg.geometry import Grid, Lens, Rig
-from stseg.io.calibrations.opencv_xml import read_opencv_lens
 from stseg.io.calibrations.point_files import PointTable, read_points
 from stseg.io.calibrations.world_frame import UNITS
+from stseg.io.calibrations.xml_files import read_opencv_lens
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
