@@ -30,8 +30,7 @@ from stseg.records.people import Explanation
 from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
 from stseg.trackers.protocol import TrackingMethod
-from stseg.trajectories.final_tracks import FinalTracks, bridged_rows, committed_tracks, final_tracks
-from stseg.trajectories.track_boxes import box_rows
+from stseg.trajectories.final_tracks import FinalTracks, box_rows, bridged_rows, committed_tracks, final_tracks
 
 _HUANG_WANG = "stseg.baselines.huang_wang_2012.proposals:Proposals"
 CANDIDATE_SOURCES = {"volume": _HUANG_WANG, "probability": _HUANG_WANG, "both": _HUANG_WANG}

@@ -12,8 +12,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.evaluation.matching import match, similarity
-from stseg.evaluation.sequence import Sequence
+from stseg.evaluation.sequence import Sequence, match, similarity
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Floats, Ints
-from stseg.evaluation.matching import similarity
-from stseg.evaluation.sequence import Sequence
+from stseg.evaluation.sequence import Sequence, similarity
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 """Similarity thresholds of a match."""

@@ -1,4 +1,4 @@
-"""Zones and lines on the ground."""
+"""Zones and lines on the ground: people in zones, their visits, and crossings of lines by direction."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats
+from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.geometry.grid import inside_polygon
 
 
@@ -57,3 +57,127 @@ class Areas:
 
     zones: tuple[Zone, ...] = ()
     lines: tuple[Line, ...] = ()
+
+
+COUNT = np.dtype(
+    [("frame", "<i8"), ("time", "<f8"), ("zone", "O"), ("people", "<i8"), ("expected", "<f8"), ("deviation", "<f8"),
+     ("density", "<f8")]
+)  # fmt: skip
+"""One row per zone and frame: number of tracks; its mean and standard deviation by the tracks' scores; people a square
+metre."""
+VISIT = np.dtype(
+    [("zone", "O"), ("id", "<i8"), ("first", "<i8"), ("last", "<i8"), ("start", "<f8"), ("dwell", "<f8"),
+     ("entered", "?"), ("left", "?")]
+)  # fmt: skip
+"""One row per stay of a track in a zone: frames, seconds; whether the track was seen outside before and after."""
+AWAY = 5.0
+"""Gap of a track from which its person was away, seconds."""
+
+
+def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -> Rows:
+    """People in a zone in every frame of a run, COUNT (time,).
+
+    A track exists with probability 1 / (1 + exp(-score)) of its row, independently of the others; the count's mean and
+    variance are the sums of p and p (1 - p).
+    """
+    inside = trajectory[zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))]
+    index = np.searchsorted(frames, inside["frame"])
+    exists = 1 / (1 + np.exp(-np.clip(inside["score"].astype(float), -50, 50)))
+    rows = np.zeros(len(frames), COUNT)
+    rows["frame"], rows["time"], rows["zone"] = frames, frames / frame_rate, zone.name
+    rows["people"] = np.bincount(index, minlength=len(frames))
+    rows["expected"] = np.bincount(index, exists, len(frames))
+    rows["deviation"] = np.sqrt(np.bincount(index, exists * (1 - exists), len(frames)))
+    rows["density"] = rows["people"] / max(zone.area, 1e-9)
+    return rows
+
+
+def zone_visits(zone: Zone, trajectory: Rows, frame_rate: float, patience: float) -> Rows:
+    """Stays of tracks in a zone, VISIT (n,), by start; absences of up to `patience` seconds do not end a stay."""
+    visits = []
+    for track in by_track(trajectory):
+        inside = zone.contains(np.stack([track["x"], track["y"]], -1))
+        starts, stops = _spells(inside, track["frame"], round(patience * frame_rate))
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+            first, last = int(track["frame"][start]), int(track["frame"][stop - 1])
+            dwell = (last - first + 1) / frame_rate
+            visits.append(
+                (zone.name, int(track["id"][0]), first, last, first / frame_rate, dwell, start > 0, stop < len(track))
+            )
+    return np.sort(np.array(visits, VISIT), order=["first", "id"])
+
+
+def by_track(trajectory: Rows) -> list[Rows]:
+    """The rows of each track in order of time."""
+    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    return [track for track in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(track)]
+
+
+def stays(track: Rows, frame_rate: float) -> list[Rows]:
+    """The rows of one track, parted where its person was away: the way from the exit to the entrance is unknown."""
+    return np.split(track, np.flatnonzero(np.diff(track["frame"]) > AWAY * frame_rate) + 1)
+
+
+def _spells(inside: Flags, frame: Ints, patience: int) -> tuple[Ints, Ints]:
+    """Half-open index ranges of stays inside; short absences are bridged."""
+    rows = np.flatnonzero(inside)
+    if not len(rows):
+        return rows, rows
+    breaks = np.flatnonzero(np.diff(frame[rows]) > patience + 1) + 1
+    starts = rows[np.concatenate([[0], breaks])]
+    stops = rows[np.concatenate([breaks - 1, [len(rows) - 1]])] + 1
+    return starts, stops
+
+
+CROSSING = np.dtype(
+    [("line", "O"), ("frame", "<i8"), ("time", "<f8"), ("id", "<i8"), ("to", "O"), ("x", "<f8"), ("y", "<f8"),
+     ("speed", "<f8")]
+)  # fmt: skip
+"""One row per crossing: seconds, the side that is reached as seen along the line, place in metres, metres a second."""
+
+
+def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float) -> Rows:
+    """Crossings of a line, CROSSING (n,), by time.
+
+    A crossing and the next one back count only where the track goes farther than `band` metres from the line between
+    them: a person who stands on it does not cross it again and again.
+    """
+    found = []
+    for stay in (stay for track in by_track(trajectory) for stay in stays(track, frame_rate)):
+        ground = np.stack([stay["x"], stay["y"]], -1)
+        kept: list[tuple[int, float, int]] = []
+        for row, share, side in _intersections(line, ground):
+            if kept and kept[-1][2] != side and not _far(line, ground[kept[-1][0] + 1 : row + 1], band):
+                kept.pop()
+            else:
+                kept.append((row, share, side))
+        for row, share, side in kept:
+            step = stay["frame"][row + 1] - stay["frame"][row]
+            frame = stay["frame"][row] + share * step
+            x, y = ground[row] + share * (ground[row + 1] - ground[row])
+            speed = float(np.hypot(*(ground[row + 1] - ground[row]))) * frame_rate / step
+            reached = "left" if side > 0 else "right"
+            place = (round(float(x), 4), round(float(y), 4), round(speed, 4))
+            found.append((line.name, int(np.ceil(frame)), frame / frame_rate, int(stay["id"][0]), reached, *place))
+    return np.sort(np.array(found, CROSSING), order=["time", "id"])
+
+
+def _far(line: Line, ground: Floats, band: float) -> bool:
+    return bool(len(ground) and line.distance(ground).max() > band)
+
+
+def _intersections(line: Line, ground: Floats) -> list[tuple[int, float, int]]:
+    """Steps that intersect the line: row before, share of the step, and side reached (1 left, -1 right)."""
+    start, way = line.points[:-1], np.diff(line.points, axis=0)
+    step = np.diff(ground, axis=0)
+    cross = step[:, None, 0] * way[None, :, 1] - step[:, None, 1] * way[None, :, 0]
+    to = start[None] - ground[:-1, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (to[..., 0] * way[None, :, 1] - to[..., 1] * way[None, :, 0]) / cross
+        along = (to[..., 0] * step[:, None, 1] - to[..., 1] * step[:, None, 0]) / cross
+    hit = (cross != 0) & (share >= 0) & (share < 1) & (along >= 0) & (along <= 1)
+    rows, segments = np.nonzero(hit)
+    order = np.lexsort((share[rows, segments], rows))
+    return [
+        (int(rows[k]), float(share[rows[k], segments[k]]), -1 if cross[rows[k], segments[k]] > 0 else 1) for k in order
+    ]

@@ -9,10 +9,8 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.geometry import Grid
-from stseg.measures.areas import Areas
-from stseg.measures.crossings import CROSSING, line_crossings
+from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, zone_counts, zone_visits
 from stseg.measures.motion import flow_field, spacings, track_measures
-from stseg.measures.zones import COUNT, VISIT, zone_counts, zone_visits
 
 ZONE = np.dtype(
     [("zone", "O"), ("area", "<f8"), ("mean_people", "<f8"), ("deviation", "<f8"), ("most_people", "<i8"),

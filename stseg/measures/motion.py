@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.measures.zones import by_track, stays
+from stseg.measures.areas import by_track, stays
 
 TRACK_MEASURE = np.dtype(
     [("id", "<i8"), ("first", "<i8"), ("last", "<i8"), ("seconds", "<f8"), ("distance", "<f8"), ("mean_speed", "<f8"),

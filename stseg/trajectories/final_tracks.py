@@ -1,7 +1,7 @@
 """From committed rows to the tracks of the whole run (docs/how-it-works.md, Tracks).
 
 committed rows -> short gaps filled -> global association -> repetitions, short tracks, ghosts dropped -> smoothed
-                  (interpolation)      (identities)          (coincidence)  (pruning)                     (smoother)
+                  (smoother)           (identities)          (pruning)                                    (smoother)
 -> people who come back, where that is wanted
    (returned_tracks)
 
@@ -16,19 +16,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Ints, Rows
+from stseg.bodies.pillars import BodyTable
 from stseg.config import Config, TrackingConfig
 from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem, Link, associate_globally
 from stseg.identities.evidence.returns import Return
 from stseg.identities.evidence.size_model import MeasuredSizes
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
-from stseg.records.tables import EVENT
+from stseg.records.tables import BOX, EVENT
 from stseg.tracking.windows.encounters import encounters
-from stseg.trajectories.coincidence import coincident
-from stseg.trajectories.interpolation import apart_from, fill_gaps, interpolated_rows
-from stseg.trajectories.pruning import drop_ghosts, drop_short
+from stseg.trajectories.pruning import coincident, drop_ghosts, drop_short
 from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
-from stseg.trajectories.smoother import smooth_places
+from stseg.trajectories.smoother import apart_from, fill_gaps, interpolated_rows, smooth_places
 
 _COINCIDENCE_TIME = 1.0
 """Time in one place from which two tracks are one person, seconds."""
@@ -181,3 +180,23 @@ class _Names:
     def last(self, identity: int) -> int:
         """The last frame of an identity; -1 if it has none."""
         return self.until.get(identity, -1)
+
+
+def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:
+    """BOX rows of a TRAJECTORY, clipped to the images; none where a view does not see the body.
+
+    Sorted by frame, then id, then view, as the trajectory is.
+    """
+    rows = []
+    ground = np.column_stack([trajectory["x"], trajectory["y"]])
+    for view, table in enumerate(tables):
+        width, height = table.size
+        edges = table.boxes_of(ground, trajectory["height"].astype(float)).clip(0, [width, height] * 2)
+        visible = (edges[:, 2] > edges[:, 0]) & (edges[:, 3] > edges[:, 1])
+        boxes = np.zeros(int(visible.sum()), BOX)
+        boxes["frame"], boxes["id"], boxes["view"] = trajectory["frame"][visible], trajectory["id"][visible], view
+        boxes["left"], boxes["top"] = edges[visible, 0], edges[visible, 1]
+        boxes["width"], boxes["height"] = (edges[visible, 2:] - edges[visible, :2]).T
+        rows.append(boxes)
+    joined = np.concatenate(rows)
+    return joined[np.lexsort((joined["view"], joined["id"], joined["frame"]))]

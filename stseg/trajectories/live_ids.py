@@ -1,16 +1,133 @@
-"""Provisional identities of a live run: run-wide names for the tracks of segments, window by window.
+"""Provisional identities of a live run: run-wide names for the tracks of segments, and what is decided again.
 
 They follow the stitching of segments (`stitching`) as far as it is known by now; the run file decides
-encounters and gaps again with the whole run (`stseg.trajectories.final_tracks`).
+encounters and gaps again with the whole run (`stseg.trajectories.final_tracks`). Every few seconds the identities of
+the latest minutes are decided as those of a whole run are (`stseg.identities.association`), under the ids that were
+published; where an id holds another person, its rows are corrected.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Container, Iterator
+from itertools import pairwise
+
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Ints, Rows
+from stseg.config import Config
+from stseg.identities.association import IdentityProblem, associate_globally
+from stseg.records.border import Border
+from stseg.records.rows_of_tracks import rows_of_tracks
+from stseg.records.tables import APPEARANCE, CORRECTION, TRAJECTORY
 from stseg.tracking.segment_stitching import matches
-from stseg.trajectories.live_corrections import corrected
+from stseg.trajectories.final_tracks import bridged_rows
+
+
+class LiveCorrections:
+    """Corrections of the ids of a live run, in the order of time.
+
+    Parameters
+    ----------
+    frame_rate
+        Frames per second.
+    border
+        Where people come and go.
+    config
+        The constants of all stages.
+    """
+
+    def __init__(self, frame_rate: float, border: Border, config: Config) -> None:
+        self._rate, self._border, self._config = frame_rate, border, config
+        self._rows, self._appearance = np.zeros(0, TRAJECTORY), np.zeros(0, APPEARANCE)
+        self._due = 0
+
+    def decide(self, rows: Rows, appearance: Rows, new_id: Callable[[], int]) -> Rows:
+        """The corrections that the next rows bring.
+
+        Parameters
+        ----------
+        rows : TRAJECTORY (n,), appearance : APPEARANCE (l,)
+            Committed rows under live ids, with what the detections look like.
+        new_id
+            A new live id.
+
+        Returns
+        -------
+        CORRECTION (k,)
+        """
+        live = self._config.live
+        if not len(rows) or live.correction_interval == 0:
+            return np.zeros(0, CORRECTION)
+        decided = int(rows["frame"].max())
+        since = decided - round(live.correction_memory * self._rate)
+        self._rows = _after(since, np.concatenate([self._rows, rows]))
+        self._appearance = _after(since, np.concatenate([self._appearance, appearance]))
+        if decided < self._due:
+            return np.zeros(0, CORRECTION)
+        self._due = decided + round(live.correction_interval * self._rate)
+        found = self._decided_again(decided, new_id)
+        self._rows = corrected(self._rows, found)
+        return found
+
+    def _decided_again(self, decided: int, new_id: Callable[[], int]) -> Rows:
+        bridged, sizes = bridged_rows(self._rows, self._rate, self._config)
+        problem = IdentityProblem.of(bridged, sizes, self._appearance, self._rate, self._border, self._config)
+        linked = associate_globally(bridged, problem)
+        identity = linked.identity[: len(self._rows)]
+        last_id = int(bridged["id"].max())
+        issued = {number: new_id() for number in np.unique(identity[identity > last_id]).tolist()}
+        named = np.array([issued.get(number, number) for number in identity.tolist()], np.int64)
+        found = [(decided, *one) for one in _differences(self._rows, named)]
+        return np.array(found, CORRECTION)
+
+
+def corrected(rows: Rows, corrections: Rows) -> Rows:
+    """TRAJECTORY rows under corrected ids: those of one decision hold at once, and one decision after another."""
+    named = rows.copy()
+    for decided in np.unique(corrections["decision_frame"]).tolist():
+        before = named["id"].copy()
+        for one in corrections[corrections["decision_frame"] == decided]:
+            chosen = (before == one["id"]) & (rows["frame"] >= one["first"]) & (rows["frame"] <= one["last"])
+            named["id"][chosen] = one["corrected_id"]
+    return named
+
+
+def renamed(names: dict[int, int], corrections: Rows, present: Container[int]) -> dict[int, int]:
+    """Ids of tracks that go on after the corrections of a decision; a lost track is left out where its id is taken.
+
+    Parameters
+    ----------
+    names
+        Id of each track.
+    corrections : CORRECTION (k,)
+    present
+        Tracks of the latest rows.
+    """
+    now = {int(one["id"]): int(one["corrected_id"]) for one in corrections if one["last"] == one["decision_frame"]}
+    found = {track: now.get(name, name) for track, name in names.items()}
+    present_names = {name for track, name in found.items() if track in present}
+    return {track: name for track, name in found.items() if track in present or name not in present_names}
+
+
+def _after(since: int, rows: Rows) -> Rows:
+    return np.asarray(rows[rows["frame"] > since])
+
+
+def _differences(rows: Rows, identity: Ints) -> Iterator[tuple[int, int, int, int]]:
+    """First and last frame in which an id holds another person, the id, and the id of that person.
+
+    A difference that lasts to the last row of an id lasts to the last frame of all: the id may go on.
+    """
+    end = int(rows["frame"].max())
+    for index in rows_of_tracks(rows["id"]):
+        ordered = index[np.argsort(rows["frame"][index], kind="stable")]
+        frame, name, published = rows["frame"][ordered], identity[ordered], int(rows["id"][index[0]])
+        edges = [0, *(np.flatnonzero(np.diff(name)) + 1).tolist(), len(index)]
+        for first, stop in pairwise(edges):
+            if name[first] != published:
+                last = end if stop == len(index) else int(frame[stop]) - 1
+                yield int(frame[first]), last, published, int(name[first])
+
 
 Names = dict[int, int]
 """Track of a segment to track of the run."""

@@ -30,8 +30,7 @@ from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.records.tables import CORRECTION, TRAJECTORY
-from stseg.trajectories.live_corrections import LiveCorrections, corrected
-from stseg.trajectories.live_ids import LiveIds
+from stseg.trajectories.live_ids import LiveCorrections, LiveIds, corrected
 
 PROGRAM = """
 import signal, sys

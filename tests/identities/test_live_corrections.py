@@ -22,7 +22,7 @@ from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.live.publishing import Publisher
 from stseg.records.border import Border
 from stseg.records.tables import APPEARANCE, CORRECTION, TRAJECTORY
-from stseg.trajectories.live_corrections import LiveCorrections, corrected, renamed
+from stseg.trajectories.live_ids import LiveCorrections, corrected, renamed
 
 RATE = 10.0
 NOTHING = np.zeros(0, APPEARANCE)

@@ -26,9 +26,9 @@ from stseg.tracking.filter.assignment import assign, distances
 from stseg.tracking.windows.tracklets import Tracklet, form_tracklets
 from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
 from stseg.tracking.windows.windows import LONGEST, SHORTEST, Window, window_length, windows
-from stseg.trajectories.interpolation import fill_gaps
+from stseg.trajectories.final_tracks import box_rows
 from stseg.trajectories.pruning import drop_ghosts, drop_short
-from stseg.trajectories.track_boxes import box_rows
+from stseg.trajectories.smoother import fill_gaps
 
 RATE = 8.0
 CONFIG = TrackingConfig()

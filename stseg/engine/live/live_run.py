@@ -29,8 +29,7 @@ from stseg.records.border import Border
 from stseg.records.tables import TRAJECTORY
 from stseg.trackers import find_tracker
 from stseg.tracking.windows.windows import window_length
-from stseg.trajectories.live_corrections import LiveCorrections, renamed
-from stseg.trajectories.live_ids import LiveIds
+from stseg.trajectories.live_ids import LiveCorrections, LiveIds, renamed
 from stseg.view_health.blind_views import BlindViews
 
 
