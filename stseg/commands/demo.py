@@ -44,7 +44,10 @@ def demo(
     run(scene / "rig.toml", output=run_file, overwrite=overwrite)
     evaluate(run_file, scene / "truth.csv")
     report(run_file, output=page, truth=scene / "truth.csv", camera_images=True, overwrite=overwrite)
-    _draw(run_file, scene, folder / "pictures")
+    # People are simulated, so camera images may be shown.
+    found, truth = read_run(run_file), read_tracks_csv(scene / "truth.csv")
+    middle = int(found.frames[len(found.frames) // 2])
+    write_pictures(folder / "pictures", read_recording(scene / "rig.toml"), found, truth, middle, camera_images=True)
     print(_what_to_open(folder))
 
 
@@ -55,13 +58,6 @@ def _require_empty(folder: Path, overwrite: bool) -> None:
             raise OutputError(folder, "", "files in it", "an empty folder, a new name, or --overwrite")
     except OSError as error:
         raise OutputError(folder, "", error.strerror or error, "a folder that can be written to") from error
-
-
-def _draw(run_file: Path, scene: Path, folder: Path) -> None:
-    """Write the pictures of the middle frame; people are simulated, so camera images may be shown."""
-    run, truth = read_run(run_file), read_tracks_csv(scene / "truth.csv")
-    middle = int(run.frames[len(run.frames) // 2])
-    write_pictures(folder, read_recording(scene / "rig.toml"), run, truth, middle, camera_images=True)
 
 
 def _what_to_open(folder: Path) -> str:

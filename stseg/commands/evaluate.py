@@ -102,9 +102,10 @@ def _area(text: str) -> Area:
 
 def _table(scores: Scores) -> Table:
     """Scores in five short rows, with the settings as the title."""
-    place = (
-        "all the ground" if scores.area is None else "x {:g} .. {:g}, y {:g} .. {:g} m".format(*_by_axis(scores.area))
-    )
+    place = "all the ground"
+    if scores.area is not None:
+        x0, y0, x1, y1 = scores.area
+        place = f"x {x0:g} .. {x1:g}, y {y0:g} .. {y1:g} m"
     title = f"{scores.frames} frames, gate {scores.gate:g} m, {place}"
     table = Table(title=title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_row(
@@ -142,11 +143,6 @@ def _table(scores: Scores) -> Table:
         "" if scores.false_track_frames is None else f"mean {scores.false_track_frames:.1f} frames",
     )
     return table
-
-
-def _by_axis(area: Area) -> tuple[float, float, float, float]:
-    x0, y0, x1, y1 = area
-    return x0, x1, y0, y1
 
 
 def _percent(value: float | None) -> str:

@@ -110,29 +110,30 @@ def _show(overview: Overview, console: Console) -> None:
 def _lines(overview: Overview) -> list[tuple[str, str]]:
     o = overview
     total = sum(o.seconds_by_stage.values())
-    stages = (f"{name} {_share(seconds, total)}" for name, seconds in o.seconds_by_stage.items())
+    stages = [
+        f"{name} {seconds:.1f} s" + (f" ({100 * seconds / total:.0f} %)" if total else "")
+        for name, seconds in o.seconds_by_stage.items()
+    ]
+    ranked = sorted(o.ghost_reasons.items(), key=lambda reason: -reason[1])  # the most frequent first
+    ground = (f"{views} see {100 * share:.0f} %" for views, share in enumerate(o.ground_by_views) if share > 0)
+    lengths = "".join(f", {name} {length:.1f} s" for name, length in o.track_seconds.items())
     span = "" if o.first_frame is None else f", {o.first_frame} to {o.last_frame}"
     return [
         ("scene", f"{o.scene}: {len(o.cameras)} cameras ({', '.join(o.cameras)}), run of {o.created}"),
         ("ground", f"x {o.x[0]:g} to {o.x[1]:g} m, y {o.y[0]:g} to {o.y[1]:g} m, cells of {o.cell:g} m"),
         ("planes", f"{o.planes} up to {o.top:g} m"),
-        ("views", ", ".join(_seen(o.ground_by_views))),
+        ("views", ", ".join(ground)),
         ("frames", f"{o.frames}{span}; {o.seconds:.1f} s at {o.frame_rate:g} frames/s"),
         ("people", f"{o.people_mean:.1f} a frame, at most {o.people_most}{_minutes(o.people_per_minute)}"),
-        ("tracks", str(len(o.tracks)) + _lengths(o.track_seconds)),
+        ("tracks", str(len(o.tracks)) + lengths),
         ("events", event_counts_text(o.events) or "none"),
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
-        ("ghosts", "; ".join(_ghosts(o)) or "none"),
+        ("ghosts", "; ".join(f"{count} because {words}" for words, count in ranked if count) or "none"),
         ("windows", f"{o.windows}, {o.frames_per_window:.1f} frames each"),
         ("time", f"{total:.1f} s" + (f", {per(o.frames, 1) / total:.1f} frames/s" if total else "")),
         ("stages", ", ".join(stages) or "none"),
         ("size", f"{o.bytes / 1e6:.1f} MB, {o.bytes_per_frame / 1e3:.1f} kB a frame"),
     ]
-
-
-def _seen(shares: list[float]) -> list[str]:
-    """Share of the ground by number of views."""
-    return [f"{views} see {100 * share:.0f} %" for views, share in enumerate(shares) if share > 0]
 
 
 def _minutes(people: list[float]) -> str:
@@ -141,16 +142,6 @@ def _minutes(people: list[float]) -> str:
     text_of_minutes = " ".join(f"{count:.1f}" for count in people[:_MINUTES])
     rest = "" if len(people) <= _MINUTES else f" ... ({len(people)} minutes)"
     return f"; minute by minute {text_of_minutes}{rest}"
-
-
-def _ghosts(overview: Overview) -> list[str]:
-    """Reasons for rejected candidates, the most frequent first."""
-    ranked = sorted(overview.ghost_reasons.items(), key=lambda reason: -reason[1])
-    return [f"{count} because {words}" for words, count in ranked if count]
-
-
-def _lengths(seconds: dict[str, float]) -> str:
-    return "".join(f", {name} {length:.1f} s" for name, length in seconds.items())
 
 
 def event_counts_text(counts: dict[str, int]) -> str:
@@ -169,10 +160,6 @@ def _views(overview: Overview) -> Table:
         errors = ("", "", "") if rates is None else tuple(f"{100 * rates[k]:.1f}" for k in ERROR_RATES)
         table.add_row(name, *errors, str(overview.ghosts_denied_by[name]))
     return table
-
-
-def _share(seconds: float, total: float) -> str:
-    return f"{seconds:.1f} s ({100 * seconds / total:.0f} %)" if total else f"{seconds:.1f} s"
 
 
 def _longest(overview: Overview) -> Table:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 from io import TextIOWrapper
-from typing import NoReturn
+from typing import Literal, NoReturn
 
 from cyclopts import App, CycloptsError
 
@@ -36,7 +36,7 @@ COMMANDS = {
     "config": ("stseg.commands.config:config", "Print the configuration with the meaning of every key."),
     "labels": ("stseg.commands.labels:labels", "Write per-pixel track-id images."),
     "calibrate": ("stseg.commands.calibrate.app:app", "Make a rig file, or check one."),
-    "completion": ("stseg.commands.terminal.completion:completion", "Print the completion script of a shell."),
+    "completion": ("stseg.commands.main:completion", "Print the completion script of a shell."),
     "simulate": ("stseg.commands.simulate:simulate", "Render a scene with ground truth."),
 }
 """Location of each command, and its line in `stseg --help`."""
@@ -165,3 +165,20 @@ def _require_command(tokens: Sequence[str]) -> None:
         close = get_close_matches(tokens[0], COMMANDS, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
         raise ConfigError("command line", "", repr(tokens[0]), f"one of {', '.join(COMMANDS)}{hint}")
+
+
+def completion(shell: Literal["bash", "zsh", "fish"], /) -> None:
+    """Print the completion script of a shell.
+
+    Example: stseg completion bash > ~/.local/share/bash-completion/completions/stseg
+
+    Example: stseg completion zsh > "${fpath[1]}/_stseg"
+
+    Example: stseg completion fish > ~/.config/fish/completions/stseg.fish
+
+    Parameters
+    ----------
+    shell
+        bash, zsh or fish.
+    """
+    print(application().generate_completion(shell=shell))

@@ -139,16 +139,11 @@ def _parts(span: Span, trajectory: Rows, seconds: float) -> list[BusyTime]:
     length = max(1, round(seconds * span.frame_rate))
     edges: Ints = np.append(np.arange(span.first, span.stop, length), span.stop)
     counts = np.bincount(trajectory["frame"] - span.first, minlength=span.stop - span.first)
-    begun, _ = np.histogram(_first_frames(trajectory), edges)
+    order = np.lexsort((trajectory["frame"], trajectory["id"]))
+    _, first_rows = np.unique(trajectory["id"][order], return_index=True)
+    begun, _ = np.histogram(trajectory["frame"][order][first_rows].astype(float), edges)
     return [
         BusyTime(first, stop, float(counts_of_part.mean()), int(counts_of_part.max()), int(new))
         for first, stop, new in zip(edges[:-1].tolist(), edges[1:].tolist(), begun.tolist(), strict=True)
         if len(counts_of_part := counts[first - span.first : stop - span.first])
     ]
-
-
-def _first_frames(trajectory: Rows) -> Floats:
-    """First frame of each track, float64 (tracks,)."""
-    order = np.lexsort((trajectory["frame"], trajectory["id"]))
-    _, first = np.unique(trajectory["id"][order], return_index=True)
-    return np.asarray(trajectory["frame"][order][first], float)

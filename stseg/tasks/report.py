@@ -21,10 +21,9 @@ from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
+from stseg.reporting.figures import Figure, Instant, RunFilm, camera_figures, ground_figures, slice_figures
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.page.page import report_page
-from stseg.reporting.pictures.film import RunFilm
 from stseg.tasks.report_contents import page_contents
 
 _DEFAULT_INSTANTS = 3
@@ -157,7 +156,6 @@ def write_pictures(
         Made where it is not there.
     recording
         The rig and its streams; these are read with `camera_images` alone.
-    run
     truth : (m,) with frame, id, x, y, or None
     frame
         The frame that slices and cameras show.

@@ -15,11 +15,10 @@ from stseg.records.ghost_reasons import GhostReasons, ghost_reasons, has_evidenc
 from stseg.reporting.charts import clock_time
 from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
 from stseg.reporting.page.answers import answers
-from stseg.reporting.page.embedded import embedded_json
+from stseg.reporting.page.embedded import embedded_json, thin_sheets
 from stseg.reporting.page.page import Contents, ViewSummary
 from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, flow_map, heat_map
 from stseg.reporting.pictures.plan import plan_view
-from stseg.reporting.pictures.sheets import thin_sheets
 from stseg.reporting.run_statistics import BUSY_DURATION, Span, busiest_minutes, ground_by_views, people_by_hour
 from stseg.tasks.overview import seconds_by_stage
 from stseg.tasks.warnings import run_warnings
@@ -38,7 +37,6 @@ def page_contents(
 
     Parameters
     ----------
-    run
     truth : (m,) with frame, id, x, y, or None
     instants
         The frames that the cameras show.

@@ -22,7 +22,6 @@ def write_slice(run: Run, text: str, output: Path, overwrite: bool) -> str:
 
     Parameters
     ----------
-    run
     text
         For example t=12.4,plane=0.9 or frame=62,plane=all.
     output

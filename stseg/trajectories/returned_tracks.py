@@ -62,7 +62,6 @@ def renamed_events(events: Rows, trajectory: Rows, returns: Sequence[Return], fr
     events : EVENT (m,)
     trajectory : TRAJECTORY (n,)
         Under the ids of people.
-    returns
     frame_rate
         Frames per second.
     """

@@ -14,13 +14,18 @@ from simulated_people import Walking, changed, delayed, walking
 
 from stseg.arrays import Floats, Singles
 from stseg.calibration.adjusted_rig import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled
-from stseg.calibration.automatic.auto import calibrate_from_people, require_merged, sharpen_by_floor
+from stseg.calibration.automatic.auto import (
+    align_all,
+    calibrate_from_people,
+    merge_views,
+    require_merged,
+    sharpen_by_floor,
+)
 from stseg.calibration.automatic.correspondence import match_endpoints
 from stseg.calibration.automatic.endpoints import Endpoints, path_of, upright_endpoints
 from stseg.calibration.automatic.single_view import view_of_upright
 from stseg.calibration.automatic.solution import SolvedViews, refine
 from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored
-from stseg.calibration.automatic.view_merging import align_all, merge_views
 from stseg.calibration.bundle_adjustment import residuals
 from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto

@@ -10,6 +10,7 @@ from simulated_people import Walking, walking
 
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import cameras_of
+from stseg.calibration.automatic.auto import align_all, merge_views
 from stseg.calibration.automatic.floor_features import Marks, floor_marks
 from stseg.calibration.automatic.solution import (
     SolvedViews,
@@ -19,7 +20,6 @@ from stseg.calibration.automatic.solution import (
     single_view_cameras,
     view_paths,
 )
-from stseg.calibration.automatic.view_merging import align_all, merge_views
 from stseg.calibration.pinhole import CENTRE
 from stseg.geometry import Camera, Grid
 from stseg.simulation import SceneSpec

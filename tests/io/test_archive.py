@@ -9,7 +9,7 @@ import pytest
 from run_files import write_small_run
 
 from stseg.commands.export import export
-from stseg.commands.terminal.completion import completion
+from stseg.commands.main import completion
 from stseg.errors import ConfigError
 
 _QUESTION = (

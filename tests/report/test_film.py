@@ -18,8 +18,8 @@ from stseg.io.outputs.video_writer import write_film
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.runs import RunWriter
 from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.reporting.figures import RunFilm
 from stseg.reporting.pictures.colours import track_colour
-from stseg.reporting.pictures.film import RunFilm
 from stseg.reporting.pictures.overlay import OverlayView
 
 VIVID = (20, 240, 160)

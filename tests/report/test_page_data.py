@@ -22,9 +22,8 @@ from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.records.ghost_reasons import ghost_reasons
 from stseg.records.tables import EVENT, TRAJECTORY, Tracks
 from stseg.reporting.page.answers import answers
-from stseg.reporting.page.embedded import embedded_json, thin_tracks
+from stseg.reporting.page.embedded import Sheets, coarse, embedded_json, spread, thin_sheets, thin_tracks
 from stseg.reporting.pictures.maps import DwellPlace
-from stseg.reporting.pictures.sheets import Sheets, coarse, spread, thin_sheets
 from stseg.reporting.run_statistics import Span
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)

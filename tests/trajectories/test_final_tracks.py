@@ -13,8 +13,8 @@ from strategies import numbers
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
-from stseg.trajectories.coincidence import coincident
 from stseg.trajectories.final_tracks import FinalTracks, final_tracks
+from stseg.trajectories.pruning import coincident
 from stseg.trajectories.smoother import smooth_places, smoothed_paths
 
 

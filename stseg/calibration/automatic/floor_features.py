@@ -62,7 +62,8 @@ def floor_marks(backgrounds: Sequence[Bytes], cameras: Sequence[Camera], grid: G
     grid
         The ground to search.
     """
-    ground = _places(grid)
+    x, y = np.arange(grid.x[0], grid.x[1], _PLAN_RESOLUTION), np.arange(grid.y[0], grid.y[1], _PLAN_RESOLUTION)
+    ground = np.stack(np.meshgrid(x, y), -1)  # of a plan, (y, x, 2)
     found = [_features(*pair, ground) for pair in zip(backgrounds, cameras, strict=True)]
     parts = []
     for i, j in combinations(range(len(cameras)), 2):
@@ -75,12 +76,6 @@ def floor_marks(backgrounds: Sequence[Bytes], cameras: Sequence[Camera], grid: G
         np.concatenate([np.zeros((0, 2, 2)), *(part[1] for part in parts)]),
         np.concatenate([np.zeros((0, 2)), *(part[2] for part in parts)]),
     )
-
-
-def _places(grid: Grid) -> Floats:
-    """Ground points of a plan, float64 (y, x, 2)."""
-    x, y = np.arange(grid.x[0], grid.x[1], _PLAN_RESOLUTION), np.arange(grid.y[0], grid.y[1], _PLAN_RESOLUTION)
-    return np.stack(np.meshgrid(x, y), -1)
 
 
 def _features(background: Bytes, camera: Camera, ground: Floats) -> tuple[Floats, AnyArray]:

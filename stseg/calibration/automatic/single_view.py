@@ -8,13 +8,14 @@ Lv, Zhao and Nevatia, Camera calibration from video of a walking human, PAMI 28(
 from __future__ import annotations
 
 from itertools import product
+from operator import itemgetter
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from stseg.arrays import Flags, Floats
 from stseg.calibration.automatic.endpoints import Endpoints, even_rows
-from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, RADIAL, SIZE, TURN, looking, on_plane, project
+from stseg.calibration.pinhole import CENTRE, FOCAL, RADIAL, SIZE, TURN, looking, on_plane, project
 
 _SPREAD = 0.05
 """Standard deviation of endpoints around the model of equal upright people, in body lengths."""
@@ -55,15 +56,11 @@ def view_of_upright(endpoints: Endpoints, size: tuple[int, int], person_height: 
         return float(found.cost), np.asarray(found.x)
 
     starts = [np.array([np.log(focal), pitch, 0.0, np.log(3.0), k1]) for focal, pitch, k1 in _STARTS]
-    rough = sorted((fit(coarse, start, 10) for start in starts), key=_cost)
-    _, best = min((fit(fine, unknown, 40) for _, unknown in rough[:3]), key=_cost)
+    rough = sorted((fit(coarse, start, 10) for start in starts), key=itemgetter(0))
+    _, best = min((fit(fine, unknown, 40) for _, unknown in rough[:3]), key=itemgetter(0))
     view = _view(best)
     away = _head_residuals(view, fine, size, person_height).reshape(-1, 2)
     return view, float(np.median(np.hypot(*away.T)))
-
-
-def _cost(fit: tuple[float, Floats]) -> float:
-    return fit[0]
 
 
 def _view(unknown: Floats) -> Floats:
@@ -71,7 +68,6 @@ def _view(unknown: Floats) -> Floats:
     focal, pitch, roll, height, k1 = unknown
     view = np.zeros(SIZE)
     view[FOCAL], view[TURN], view[CENTRE], view[RADIAL] = focal, looking(pitch, roll), (0, 0, np.exp(height)), (k1, 0)
-    view[CLOCK] = 0.0
     return view
 
 

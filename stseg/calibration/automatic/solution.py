@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints
+from stseg.calibration.automatic.auto import MergedViews
 from stseg.calibration.automatic.correspondence import Correspondences, match_endpoints
 from stseg.calibration.automatic.endpoints import Endpoints, even_rows, path_of
 from stseg.calibration.automatic.floor_features import Marks
 from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
-from stseg.calibration.automatic.view_alignment import Alignment, ViewPaths
-from stseg.calibration.automatic.view_merging import MergedViews
+from stseg.calibration.automatic.view_alignment import ViewPaths
 from stseg.calibration.bundle_adjustment import Adjustment, BundleParameters, BundleProblem, adjust, same_make
 from stseg.calibration.pinhole import CLOCK, height_of_head, moved
 
@@ -86,13 +86,9 @@ def view_paths(views: CalibrationInput, single_cameras: Sequence[Floats]) -> lis
 
 def placed_views(single_cameras: Sequence[Floats], merged: MergedViews) -> Floats:
     """All cameras on the ground of the first view, float64 (view, 12)."""
-    return np.array([_placed(view, merged.placed[k]) for k, view in enumerate(single_cameras)])
-
-
-def _placed(view: Floats, way: Alignment) -> Floats:
-    back = way.inverse
-    shift = np.array([back.shift.real, back.shift.imag])
-    return moved(view, float(np.angle(back.factor)), shift, abs(back.factor))
+    back = [merged.placed[k].inverse for k in range(len(single_cameras))]
+    ways = [(float(np.angle(one.factor)), np.array([one.shift.real, one.shift.imag]), abs(one.factor)) for one in back]
+    return np.array([moved(view, *way) for view, way in zip(single_cameras, ways, strict=True)])
 
 
 def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> SolvedViews:
@@ -134,10 +130,11 @@ def _round(
     matched = matched.of(even_rows(len(matched.frame), _MAX_POINTS))
     refined = len(parameters.points) > 0
     height = _heights(views, parameters, matched) if refined else np.full(len(matched.frame), views.person_height)
+    length = np.hypot(*(matched.foot - matched.head).T)
     problem = BundleProblem(
         np.array(views.sizes),
         matched,
-        _observation_spread(matched, spread),
+        np.maximum(spread, (_MIN_PIXEL_SPREAD / length)[:, None, None]),
         height,
         _HEAD_SPREAD if refined else _HEIGHT_SPREAD,
         _redundancy(matched, views),
@@ -216,12 +213,6 @@ def _redundancy(matched: Correspondences, views: CalibrationInput) -> float:
     frames = max(len(np.unique(matched.frame)), 1)
     rate = views.frame_rate * frames / max(int(np.ptp(matched.frame)) + 1 if len(matched.frame) else 1, 1)
     return max(1.0, rate * _STEP_SECONDS)
-
-
-def _observation_spread(matched: Correspondences, spread: Floats) -> Floats:
-    """Standard deviations of each observation, in body lengths, not below the pixel floor."""
-    length = np.hypot(*(matched.foot - matched.head).T)
-    return np.asarray(np.maximum(spread, (_MIN_PIXEL_SPREAD / length)[:, None, None]))
 
 
 def _residual_spread(solution: SolvedViews) -> Floats:

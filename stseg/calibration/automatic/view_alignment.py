@@ -7,6 +7,7 @@ Identities and clock offsets are unknown: every path of one view is compared wit
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -80,23 +81,19 @@ def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> lis
         Largest delay, frames.
     """
     tried = _from_paths(a, b, frame_rate, most_delay) + _from_frame_pairs(a, b, frame_rate, most_delay)
-    judged = sorted((_refined(a, b, one) for one in tried), key=_less_support)
+    judged = sorted((_refined(a, b, one) for one in tried), key=lambda one: -one.support)
     best: list[Alignment] = []
     for one in judged:
         if all(_differ(one, other, frame_rate) for other in best):
             best.append(_at_best_delay(a, b, one, most_delay))
         if len(best) == _MAX_ALIGNMENTS:
             break
-    return sorted(best, key=_less_support)
+    return sorted(best, key=lambda one: -one.support)
 
 
 def mirrored(paths: ViewPaths) -> ViewPaths:
     """The paths mirrored."""
     return ViewPaths(paths.frame, np.conj(paths.place), paths.path)
-
-
-def _less_support(one: Alignment) -> float:
-    return -one.support
 
 
 def _differ(one: Alignment, other: Alignment, frame_rate: float) -> bool:
@@ -221,16 +218,13 @@ def _at_best_delay(a: ViewPaths, b: ViewPaths, one: Alignment, most_delay: int) 
     best, step = one, 8
     while step:
         delays = [best.delay + off for off in (-step, step) if abs(best.delay + off) <= most_delay]
-        better = max((_refined(a, b, replace(best, delay=delay)) for delay in delays), key=_has_support, default=best)
+        refined = (_refined(a, b, replace(best, delay=delay)) for delay in delays)
+        better = max(refined, key=attrgetter("support"), default=best)
         if better.support > best.support:
             best = better
         else:
             step //= 2
     return best
-
-
-def _has_support(one: Alignment) -> float:
-    return one.support
 
 
 def support(a: ViewPaths, b: ViewPaths, one: Alignment) -> float:

@@ -61,10 +61,8 @@ def find_swapped_streams(
 
     Parameters
     ----------
-    rig
     tables
         See `tables_of`.
-    boxes_by_frame
     frames
         Frames to use.
     people
@@ -110,7 +108,6 @@ def find_stream_delay(
 
     Parameters
     ----------
-    tables
     boxes_by_frame
         Boxes of all frames, without gaps.
     people

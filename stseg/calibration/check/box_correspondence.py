@@ -63,7 +63,6 @@ def match_boxes(rig: Rig, tables: Sequence[BodyTable], frame: int, boxes: Sequen
 
     Parameters
     ----------
-    rig
     tables
         See `tables_of`.
     frame

@@ -81,7 +81,6 @@ def edge_residuals(table: BodyTable, ground: Floats, height: Floats, box: Floats
 
     Parameters
     ----------
-    table
     ground : float64 (n, 2), height : float64 (n,)
         Metres.
     box : float64 (n, 4)

@@ -60,7 +60,6 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
 
     Parameters
     ----------
-    rig
     boxes_by_frame
         Boxes of every view in consecutive frames, see `isolated_boxes`.
     """

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes, Floats
+from stseg.calibration.automatic.endpoints import even_rows
 from stseg.errors import CalibrationError
 
 MIN_VIEWS = 8
@@ -70,7 +71,7 @@ def fit_lens(
     if len(corners) < MIN_VIEWS:
         expected = f"at least {MIN_VIEWS}, tilted and all over the image (is --board the number of inner corners?)"
         raise CalibrationError(name, "checkerboard", f"{len(corners)} views of the whole board", expected)
-    chosen = np.unique(np.linspace(0, len(corners) - 1, min(_MAX_VIEWS, len(corners))).astype(int))
+    chosen = even_rows(len(corners), _MAX_VIEWS)
     grid = np.stack(np.meshgrid(np.arange(board[0]), np.arange(board[1])), -1).reshape(-1, 2) * square
     points = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
     pixels = [corners[k].astype(np.float32) for k in chosen]

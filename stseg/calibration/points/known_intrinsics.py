@@ -30,11 +30,6 @@ class Pinhole:
     noise: float
     """Squared error per degree of freedom, square pixels."""
 
-    @property
-    def unknowns(self) -> int:
-        """Number of unknowns of the fit."""
-        return len(self.normal)
-
     def covariance(self, noise: float) -> Floats:
         """Covariance of the parameters, float64 (12, 12), for a noise variance in square pixels."""
         inverse = np.asarray(np.linalg.pinv(self.normal, hermitian=True), float)

@@ -16,7 +16,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from stseg.arrays import Flags, Floats
 from stseg.calibration.pinhole import ground_jacobian
-from stseg.calibration.points.known_intrinsics import Pinhole, fit_pinhole
+from stseg.calibration.points.known_intrinsics import fit_pinhole
 from stseg.calibration.points.point_requirements import require_ground, require_right_handed, require_upright
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera, Grid, Lens
@@ -139,11 +139,14 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     wrong = _outliers(np.hypot(*(_project(robust.x, points.ground, points.height, lens) - points.pixel).T), used)
     used &= ~wrong
     fitted = _refined(robust.x, points, used, lens, "linear")
-    parameters, covariance = fitted.x, _covariance(fitted.jac, fitted.fun, int(used.sum()))
+    parameters, freedom = fitted.x, len(fitted.fun) - (len(fitted.x) - 1)
+    # Noise variance times the pseudo-inverse of J'J: the scale is free.
+    noise = max(float(np.sum(fitted.fun**2)) / max(freedom, 1), _CLICK_SPREAD**2)
+    covariance = np.asarray(noise * np.linalg.pinv(fitted.jac.T @ fitted.jac, rcond=1e-14, hermitian=True))
     pinhole = fit_pinhole(
         fitted.x[:9].reshape(3, 3), size, points.ground[used], points.height[used], points.pixel[used], lens
     )
-    if pinhole is not None and _fits_as_well(pinhole, fitted.fun, len(fitted.x) - 1):
+    if pinhole is not None and pinhole.noise <= _NOISE_RATIO * noise:
         parameters, covariance = pinhole.parameters, pinhole.covariance(max(pinhole.noise, _CLICK_SPREAD**2))
         vertical_from = "square pixels" if lens is None else "lens"
     ground = parameters[:9].reshape(3, 3)
@@ -154,14 +157,9 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     projected, _ = camera.project(points.ground, points.height)
     off = np.hypot(*(projected - points.pixel).T)
     out = wrong | _outliers(off, used)
-    return PointFit(camera, points, vertical_from, off, _off_ground(camera, points), out, parameters, covariance)
-
-
-def _fits_as_well(pinhole: Pinhole, free_miss: Floats, unknowns: int) -> bool:
-    """Whether the pose fits as well as the free homography, per degree of freedom."""
-    count = len(free_miss)
-    free = max(float(np.sum(free_miss**2)) / max(count - unknowns, 1), _CLICK_SPREAD**2)
-    return pinhole.noise <= _NOISE_RATIO * free
+    ground = [camera.back_project(pixel, z) for pixel, z in zip(points.pixel, points.height.tolist(), strict=True)]
+    off_ground = np.hypot(*(np.array(ground) - points.ground).T)
+    return PointFit(camera, points, vertical_from, off, off_ground, out, parameters, covariance)
 
 
 def _outliers(off: Floats, used: Flags) -> Flags:
@@ -179,18 +177,11 @@ def _start(points: Points, ideal: Floats) -> Floats:
         found, _ = cv2.findHomography((ground - middle) / reach, pixel, cv2.USAC_MAGSAC, _MAGSAC_NOISE, maxIters=10_000)
         if found is not None:
             unit = np.array([[1 / reach, 0, -middle[0] / reach], [0, 1 / reach, -middle[1] / reach], [0, 0, 1]])
-            starts.append(_ahead(np.asarray(found, float) @ unit, ground))
-    return min(starts, key=lambda homography: float(np.median(_miss(homography, ground, pixel))))
-
-
-def _ahead(homography: Floats, ground: Floats) -> Floats:
-    depth = ground @ homography[2, :2] + homography[2, 2]
-    return homography if np.median(depth) > 0 else -homography
-
-
-def _miss(homography: Floats, ground: Floats, pixel: Floats) -> Floats:
-    image = np.concatenate([ground, np.ones((len(ground), 1))], 1) @ homography.T
-    return np.asarray(np.hypot(*(image[:, :2] / image[:, 2:] - pixel).T))
+            homography = np.asarray(found, float) @ unit
+            depth = ground @ homography[2, :2] + homography[2, 2]
+            starts.append(homography if np.median(depth) > 0 else -homography)
+    misses = [_project(start.ravel(), ground, np.zeros(len(ground)), None) - pixel for start in starts]
+    return min(zip(misses, starts, strict=True), key=lambda one: float(np.median(np.hypot(*one[0].T))))[1]
 
 
 def _assumed_vertical(name: str, ground: Floats, size: tuple[int, int], lens: Lens | None) -> Floats:
@@ -239,15 +230,3 @@ def _slope(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None
         later = _project(parameters + move, ground, height, lens)
         columns.append((later - _project(parameters - move, ground, height, lens)) / (2 * size))
     return np.stack(columns, -1)
-
-
-def _covariance(slope: Floats, miss: Floats, count: int) -> Floats:
-    """Covariance of the parameters: noise variance times the pseudo-inverse of J'J (the scale is free)."""
-    free = max(2 * count - (slope.shape[1] - 1), 1)
-    noise = max(float(np.sum(miss**2)) / free, _CLICK_SPREAD**2)
-    return np.asarray(noise * np.linalg.pinv(slope.T @ slope, rcond=1e-14, hermitian=True))
-
-
-def _off_ground(camera: Camera, points: Points) -> Floats:
-    ground = [camera.back_project(pixel, z) for pixel, z in zip(points.pixel, points.height.tolist(), strict=True)]
-    return np.asarray(np.hypot(*(np.array(ground) - points.ground).T))

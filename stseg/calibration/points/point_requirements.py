@@ -47,7 +47,6 @@ def require_right_handed(name: str, ground: Floats, vertical: Floats) -> None:
 
     Parameters
     ----------
-    name
     ground : float64 (3, 3)
         Homography, signed so that its points lie before the camera.
     vertical : float64 (3,)
@@ -87,7 +86,6 @@ def require_height(camera: Camera, unit: str, metres: dict[str, float]) -> None:
 
     Parameters
     ----------
-    camera
     unit
         The assumed unit of its points.
     metres

@@ -28,7 +28,6 @@ def answers(
 
     Parameters
     ----------
-    span
     frames
         Number of frames of the run.
     trajectory, tracks, events
@@ -79,7 +78,7 @@ def _ghosts(frames: int, candidates: int, reasons: GhostReasons, events: Rows) -
     count = len(reasons.ghosts)
     short = int((events["kind"] == b"dropped").sum())
     were = "was" if short == 1 else "were"
-    tracks = f" {_counted(short, 'track')} too short or too uncertain {were} dropped as well."
+    tracks = f" {short} track{'' if short == 1 else 's'} too short or too uncertain {were} dropped as well."
     if not count:
         return "No candidate was dropped." + (tracks if short else "")
     ranked = sorted(zip(reasons.counts(), REASONS, strict=True), reverse=True)
@@ -93,7 +92,3 @@ def _blind(shares: Floats) -> str:
     none, one = 100 * shares[0], 100 * (shares[1] if len(shares) > 1 else 0.0)
     lone = f"<b>{one:.0f} %</b> by one alone, which cannot tell a person from a ghost"
     return f"<b>{none:.0f} %</b> of the ground is seen by no view, {lone}, and {100 - none - one:.0f} % by two or more."
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.reporting.page.html import jpeg_uri
-from stseg.reporting.page.template import page, script_json
+from stseg.reporting.page.html import jpeg_uri, page, script_json
 
 _MAX_FRAME_WIDTH = 1920
 """Greatest width of a frame in the page, pixels; points are in the camera's own pixels."""

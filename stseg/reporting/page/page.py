@@ -12,8 +12,7 @@ from stseg.arrays import Floats, Rows
 from stseg.records.ghost_reasons import REASONS, GhostReasons
 from stseg.reporting.charts import people_chart, track_chart
 from stseg.reporting.figures import Figure
-from stseg.reporting.page.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
-from stseg.reporting.page.template import page
+from stseg.reporting.page.html import MOST_ROWS, bars, chart, figure, figures, note, page, section, swatch, table, when
 from stseg.reporting.run_statistics import DOUBT_LIMIT, BusyTime, Span, doubtful_stretches, mean_certainty
 
 
@@ -99,13 +98,13 @@ def report_page(contents: Contents) -> str:
 
 def _sections(contents: Contents) -> list[str]:
     span, tracks = contents.span, contents.tracks
+    answers = "".join(f"<h3>{escape(question)}</h3><p>{answer}</p>" for question, answer in contents.answers)
+    view_heads = "".join(f"<th>{escape(summary.name)}</th>" for summary in contents.view_summaries)
     counted = "people in each frame" + ("" if contents.truth is None else "; dashed: the truth")
     return [
-        section("In short", _answers(contents.answers), *(note(escape(words), "warn") for words in contents.warnings)),
+        section("In short", answers, *(note(escape(words), "warn") for words in contents.warnings)),
         section("On the ground, and in time", _pair(figure(contents.plan), _thread(contents.thread))),
-        section(
-            "Moment by moment", _MOMENT.format(grey=_GREY[contents.kept], views=_view_heads(contents.view_summaries))
-        ),
+        section("Moment by moment", _MOMENT.format(grey=_GREY[contents.kept], views=view_heads)),
         section(
             "People over time",
             chart(people_chart(span, contents.trajectory, contents.truth), counted),
@@ -125,8 +124,8 @@ def _sections(contents: Contents) -> list[str]:
         ),
         section("Events", _event_summary(contents), _event_table(span, contents.events)),
         section("Occupancy", _cells(contents.cell_probability), figures(contents.slices, "sheets")),
-        section("Cameras", _privacy(contents), figures(contents.cameras, "pair")) if contents.cameras else "",
-        section("Time to compute", _stages(contents.stages)),
+        section("Cameras", _IMAGES[contents.has_images], figures(contents.cameras, "pair")) if contents.cameras else "",
+        section("Time to compute", bars(contents.stages, sum(part for _, part in contents.stages), "{:,.1f} s")),
     ]
 
 
@@ -168,7 +167,10 @@ _GHOSTS = note(
     "people cross. Every frame is explained by the most probable set of people; candidates outside it are dropped."
 )
 
-
+_IMAGES = (
+    note("Drawn from the tracks alone: this page holds no image from a camera."),
+    note("This page shows images from the cameras. Share it with care.", "note warn"),
+)
 _SIGHTS = note(
     "The evidence is the median over the people in the view. Where it is near 0 or below, the others find people that "
     "this view does not confirm: look at its calibration, and whether it has moved."
@@ -177,10 +179,6 @@ _SIGHTS = note(
 
 def _pair(left: str, right: str) -> str:
     return f'<div class="pair">{left}{right}</div>'
-
-
-def _answers(answers: Sequence[tuple[str, str]]) -> str:
-    return "".join(f"<h3>{escape(question)}</h3><p>{answer}</p>" for question, answer in answers)
 
 
 def _hours(span: Span, hours: Sequence[BusyTime]) -> str:
@@ -200,16 +198,6 @@ def _thread(fallback: Figure) -> str:
     )
 
 
-def _view_heads(view_summaries: Sequence[ViewSummary]) -> str:
-    return "".join(f"<th>{escape(summary.name)}</th>" for summary in view_summaries)
-
-
-def _privacy(contents: Contents) -> str:
-    if contents.has_images:
-        return note("This page shows images from the cameras. Share it with care.", "note warn")
-    return note("Drawn from the tracks alone: this page holds no image from a camera.")
-
-
 def _reasons(contents: Contents) -> str:
     """Number of ghosts removed for each reason, the commonest first, and of those that each view denies."""
     counts, count = contents.ghosts.counts(), len(contents.ghosts.ghosts)
@@ -222,10 +210,6 @@ def _reasons(contents: Contents) -> str:
         parts.append(note("Views that deny them; several may deny the same ghost:"))
         parts.append(bars(denied, count, "{:,.0f}"))
     return f"<div>{''.join(parts)}</div>"
-
-
-def _stages(stages: Sequence[tuple[str, float]]) -> str:
-    return bars(stages, sum(seconds for _, seconds in stages), "{:,.1f} s")
 
 
 def _view_summaries(view_summaries: Sequence[ViewSummary]) -> str:

@@ -12,8 +12,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Observation, Rows
 from stseg.geometry import Camera, Rig
 from stseg.reporting.figures import backdrop
-from stseg.reporting.page.html import jpeg_uri
-from stseg.reporting.page.template import page, script_json
+from stseg.reporting.page.html import jpeg_uri, page, script_json
 from stseg.reporting.pictures.overlay import overlay
 
 _WIDTH, _HEIGHT = 960, 260
@@ -70,7 +69,9 @@ def moment_picture(
     picture = overlay(camera, rig.grid, backdrop(observation, camera.size), trajectory, frame, trail, _WIDTH)
     nearest = trajectory[np.isin(trajectory["id"], ids)]
     nearest = nearest[np.abs(nearest["frame"] - frame) <= trail]
-    return _resized(_crop(picture, camera, nearest) if len(nearest) else picture)
+    part = _crop(picture, camera, nearest) if len(nearest) else picture
+    scale = _HEIGHT / part.shape[0]
+    return np.asarray(cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _crop(picture: Bytes, camera: Camera, rows: Rows) -> Bytes:
@@ -83,11 +84,6 @@ def _crop(picture: Bytes, camera: Camera, rows: Rows) -> Bytes:
     low, high = np.clip(pixel.min(axis=0) - 60, 0, limit - 80), np.clip(pixel.max(axis=0) + 60, 80, limit)
     (left, top), (right, bottom) = low.astype(int).tolist(), high.astype(int).tolist()
     return picture[top:bottom, left:right] if right - left > 40 and bottom - top > 40 else picture
-
-
-def _resized(picture: Bytes) -> Bytes:
-    scale = _HEIGHT / picture.shape[0]
-    return np.asarray(cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 _STYLE = """

@@ -15,6 +15,8 @@ from stseg.arrays import Bytes, Floats
 
 Colour = tuple[int, int, int]
 """Blue, green, red, 0..255: OpenCV's order."""
+Picture = Bytes
+"""uint8 (v, u, 3): blue, green, red."""
 
 INK: Colour = (52, 46, 42)
 QUIET: Colour = (138, 130, 124)

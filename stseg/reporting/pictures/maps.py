@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows
 from stseg.geometry import Grid, Rig
 from stseg.reporting.pictures.canvas import chip, chip_size, fill, outline, place_labels, stroke, text, text_size
-from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, mixed
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed
 from stseg.reporting.pictures.plan import border, draw_cameras
 from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
@@ -123,23 +123,15 @@ def map_of_maps(rig: Rig) -> PlanMap:
     return PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
 
 
-def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks: Sequence[DwellPlace] = ()) -> Bytes:
+def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks: Sequence[DwellPlace] = ()) -> Picture:
     """Heat map of bins from above, y up: white for none, dark for much.
 
     Parameters
     ----------
-    rig
-    bins
     values : float64 (y, x)
         Zero or more; the colour scale ends at their 99th percentile.
-    title, units
     marks
         Places that are lettered A, B, C.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-        Blue, green, red.
     """
     limit = float(np.percentile(values[values > 0], 99)) if (values > 0).any() else 1.0
     plan = map_of_maps(rig)
@@ -226,23 +218,17 @@ _LINE: Colour = (60, 60, 200)
 
 def flow_map(
     rig: Rig, field: Rows, zones: Sequence[tuple[str, Sequence[Floats]]], lines: Sequence[tuple[str, Floats]]
-) -> Bytes:
+) -> Picture:
     """Density from above, with an arrow of the mean velocity in each busy bin.
 
     Parameters
     ----------
-    rig
     field : CELL (bins,)
         Of `stseg.measures.motion.flow_field`.
     zones
         Name and rings of each, metres.
     lines
         Name and points of each, metres.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-        Blue, green, red.
     """
     x = np.unique(field["x"])
     side = float(np.diff(x).min()) if len(x) > 1 else rig.grid.x[1] - rig.grid.x[0]

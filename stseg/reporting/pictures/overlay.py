@@ -25,7 +25,7 @@ from stseg.reporting.pictures.canvas import (
     stroke,
     text,
 )
-from stseg.reporting.pictures.colours import INK, NIGHT, PAPER, Colour, mixed, track_colour
+from stseg.reporting.pictures.colours import INK, NIGHT, PAPER, Colour, Picture, mixed, track_colour
 
 _SUBPIXELS = 4  # sub-pixels a pixel of a pillar's outline
 _CIRCLE_ANGLES = np.linspace(0, 2 * np.pi, 33)[:-1]
@@ -49,7 +49,7 @@ def overlay(
     frame: int,
     trail: int = 25,
     width: int = 1280,
-) -> Bytes:
+) -> Picture:
     """Draw the people of a frame over a camera's image.
 
     Parameters
@@ -68,11 +68,6 @@ def overlay(
         How many frames a trail reaches back.
     width
         Width of the picture, pixels.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-        Blue, green, red.
     """
     view = OverlayView(camera, width)
     canvas = view.canvas(image)
@@ -82,7 +77,8 @@ def overlay(
     recent = trajectory[(trajectory["frame"] <= frame) & (trajectory["frame"] >= frame - trail)]
     for row in present:
         _draw_trail(canvas, view, recent[recent["id"] == row["id"]], frame, trail)
-    for row in present[np.argsort(-_distance(camera, present), kind="stable")]:
+    distance = np.hypot(present["x"] - camera.centre[0], present["y"] - camera.centre[1])
+    for row in present[np.argsort(-distance, kind="stable")]:
         _draw_pillar(canvas, view, row)
     _label(canvas, view, present)
     text(canvas, f"{camera.name}  frame {frame}", (18, 16), PAPER, 14, (0, 0), 2)
@@ -181,10 +177,6 @@ def _height(row: np.void) -> float:
     return height if np.isfinite(height) and height > 0 else BODY_HEIGHT
 
 
-def _distance(camera: Camera, rows: Rows) -> Floats:
-    return np.asarray(np.hypot(rows["x"] - camera.centre[0], rows["y"] - camera.centre[1]))
-
-
 def _rule(canvas: Bytes, view: OverlayView, grid: Grid) -> None:
     """The ground's metres, and its rectangle a little brighter."""
     (x0, x1), (y0, y1) = grid.x, grid.y
@@ -207,24 +199,17 @@ def _ground_lines(
         stroke(canvas, view.pixel(np.stack([x, y], -1), 0.0), *styles[is_border])
 
 
-def grid_picture(camera: Camera, grid: Grid, image: Bytes | None, frame: int, width: int = 1280) -> Bytes:
+def grid_picture(camera: Camera, grid: Grid, image: Bytes | None, frame: int, width: int = 1280) -> Picture:
     """The ground's metres, and poles as tall as most people with a mark at each half metre, over a camera's frame.
 
     Parameters
     ----------
-    camera
-    grid
     image : uint8 (v, u, 3) or (v, u) or None
         As in `overlay`.
     frame
         Its number.
     width
         Of the picture, pixels.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-        Blue, green, red.
     """
     view = OverlayView(camera, width)
     canvas = view.canvas(image)

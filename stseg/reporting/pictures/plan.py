@@ -8,7 +8,7 @@ from types import MappingProxyType
 import cv2
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Floats, Rows
+from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
 from stseg.reporting.pictures.canvas import (
     chip,
@@ -22,7 +22,7 @@ from stseg.reporting.pictures.canvas import (
     text,
     text_size,
 )
-from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, mixed, track_colour
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed, track_colour
 from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
 _CAMERA_DISTANCE = 0.45  # cameras within this share of the ground's longer side are shown where they stand
@@ -40,7 +40,7 @@ def plan_view(
     width: int = 1400,
     height: int = 1500,
     names: Mapping[int, str] = MappingProxyType({}),
-) -> Bytes:
+) -> Picture:
     """Draw the ground from above, y up.
 
     Parameters
@@ -59,11 +59,6 @@ def plan_view(
         The largest size of the picture, pixels.
     names
         Names of tracks by id, which then stand instead of their ids.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-        Blue, green, red.
     """
     plan = plan_map(rig, width, height)
     canvas = ground_sheet(plan, rig, coverage, title or rig.name)
@@ -190,7 +185,9 @@ def _view_directions(camera: Camera) -> Floats | None:
 def _paths(table: Rows) -> list[tuple[int, Floats]]:
     """Each id with its places in order of time; a nan stands where frames are missing."""
     paths = []
-    step = _frame_step(table["frame"])
+    numbers = np.unique(table["frame"])
+    # Frames from one row to the next where nothing is missing: truth may be sparse.
+    step = int(np.diff(numbers).min()) if len(numbers) > 1 else 1
     order = np.lexsort((table["frame"], table["id"]))
     table = table[order]
     for rows in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
@@ -199,12 +196,6 @@ def _paths(table: Rows) -> list[tuple[int, Floats]]:
             gaps = np.flatnonzero(np.diff(rows["frame"]) > step) + 1
             paths.append((int(rows["id"][0]), np.insert(places, gaps, np.nan, axis=0)))
     return paths
-
-
-def _frame_step(frames: AnyArray) -> int:
-    """Frames from one row of a table to the next where nothing is missing: truth may be sparse."""
-    numbers = np.unique(frames)
-    return int(np.diff(numbers).min()) if len(numbers) > 1 else 1
 
 
 def _draw_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:

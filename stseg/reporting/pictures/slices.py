@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from stseg.arrays import AnyArray, Bytes, Flags, Labels
 from stseg.geometry import Grid
 from stseg.reporting.pictures.canvas import blank, chip, outline, text
-from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, track_colour
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Picture, track_colour
 
 _STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 # blue-ish below 0, nearly white at 0, orange above; blue, green, red
@@ -24,7 +24,7 @@ _MAX_OUTLINE = 5  # greatest width of an outline, pixels
 
 def volume_picture(
     log_odds: AnyArray, label: Labels, grid: Grid, title: str = "", width: int = 1400, limit: float | None = None
-) -> Bytes:
+) -> Picture:
     """All planes of one frame as a contact sheet, the ground first, y up.
 
     Parameters
@@ -41,11 +41,6 @@ def volume_picture(
         About how wide the picture is, pixels.
     limit
         Log-odds at which colours end, nats; None for the 99th percentile of their sizes.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-        Blue, green, red.
     """
     panels = [_Panel(f"{z:.2f} m", log_odds[k], label[k]) for k, z in enumerate(grid.heights)]
     return _contact_sheet(panels, title, width, colour_limit(log_odds) if limit is None else limit)
@@ -53,13 +48,8 @@ def volume_picture(
 
 def marginal_picture(
     log_odds: AnyArray, label: Labels, grid: Grid, title: str = "", width: int = 700, limit: float | None = None
-) -> Bytes:
-    """The greatest log-odds over each ground cell, outlined by the id that is commonest above it; see `volume_picture`.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-    """
+) -> Picture:
+    """The greatest log-odds over each ground cell, outlined by the id commonest above it; see `volume_picture`."""
     finite = np.isfinite(log_odds)
     highest = np.where(finite, log_odds, -np.inf).max(axis=0)
     highest = np.where(finite.any(axis=0), highest, np.nan)
@@ -69,13 +59,8 @@ def marginal_picture(
 
 def plane_picture(
     log_odds: AnyArray, label: Labels, grid: Grid, plane: int, title: str = "", width: int = 700
-) -> Bytes:
-    """One plane of one frame, coloured as `volume_picture` colours it; `plane` counts from the ground, 0.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-    """
+) -> Picture:
+    """One plane of one frame, coloured as `volume_picture` colours it; `plane` counts from the ground, 0."""
     panel = _Panel(f"{grid.heights[plane]:.2f} m high; {_extent(grid)}", log_odds[plane], label[plane])
     return _contact_sheet([panel], title, width, colour_limit(log_odds))
 

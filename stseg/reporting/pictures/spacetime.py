@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Grid
 from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fill, outline, place_labels, stroke, text
-from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, mixed, track_colour
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Picture, mixed, track_colour
 from stseg.reporting.pictures.plan_map import step_for
 
 _AZIMUTH, _ELEVATION = np.radians(-32.0), np.radians(32.0)
@@ -20,7 +20,7 @@ _MAX_LABELS = 24
 
 def spacetime_picture(
     grid: Grid, trajectory: Rows, frame_rate: float, title: str = "", width: int = 1200, height: int = 1400
-) -> Bytes:
+) -> Picture:
     """Draw tracks as threads that rise with time; near ones pass in front of far ones.
 
     Parameters
@@ -34,11 +34,6 @@ def spacetime_picture(
         Stands above.
     width, height
         Size of the picture, pixels.
-
-    Returns
-    -------
-    uint8 (v, u, 3)
-        Blue, green, red.
     """
     canvas = blank(width, height, PAPER)
     text(canvas, title, (40, 30), INK, 20, (0, 0), 2)

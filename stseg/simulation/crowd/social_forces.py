@@ -102,19 +102,14 @@ def _new_pedestrian(spec: SceneSpec, planner: Planner, number: int, others: Floa
         ground,
         planner.errand(enters=not crowded_start),
         pace=rng.uniform(*spec.speed),
-        height=_height(spec, rng),
+        height=rng.uniform(spec.heights[0], spec.heights[-1])
+        if spec.heights
+        else float(np.clip(rng.normal(1.70, 0.10), 1.45, 1.98)),
         build=float(np.clip(rng.normal(1.0, 0.09), 0.8, 1.25)),
         velocity=np.zeros(2),
         heading=rng.uniform(-np.pi, np.pi),
         phase=rng.uniform(0, 2 * np.pi),
     )
-
-
-def _height(spec: SceneSpec, rng: np.random.Generator) -> float:
-    """Height of one person, metres."""
-    if spec.heights:
-        return float(rng.uniform(spec.heights[0], spec.heights[-1]))
-    return float(np.clip(rng.normal(1.70, 0.10), 1.45, 1.98))
 
 
 def _advance(pedestrians: list[Pedestrian], half: Floats, step: float) -> None:

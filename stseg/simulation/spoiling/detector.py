@@ -64,23 +64,16 @@ def detect(camera: Camera, visible: Ints, silhouettes: Ints, half: Floats, rng: 
     found = (rng.uniform(size=len(share)) < probability) & (visible[:, 4] > _MIN_AREA * width * height)
     guessed = (rng.uniform(size=len(share)) < _WHOLE_BODY_PROBABILITY) & (share > _HALF_SHARE)
     spans = np.where(guessed[:, None], silhouettes, visible)[:, :4]
-    edges = _edges(spans) + _edge_noise(spans, rng)
+    # left, top, right, bottom, with errors
+    edges = spans[:, [0, 2, 1, 3]] + np.array([-0.5, -0.5, 0.5, 0.5])
+    size = np.maximum(spans[:, [1, 3]] - spans[:, [0, 2]] + 1, 1)
+    edges = edges + rng.normal(0.0, _EDGE_SPREAD, (len(spans), 4)) * np.tile(size, 2)
     score = np.clip(0.35 + 0.6 * share + rng.normal(0.0, 0.08, len(share)), 0.05, 1.0)
     false_edges, false_scores = _false_boxes(camera, half, rng)
     edges, score = np.concatenate([edges[found], false_edges]), np.concatenate([score[found], false_scores])
     edges = np.clip(edges, -0.5, [width - 0.5, height - 0.5, width - 0.5, height - 0.5])
     kept = _non_maximum_suppression(edges, score)
     return Boxes(np.concatenate([edges[kept, :2], edges[kept, 2:] - edges[kept, :2]], axis=1), score[kept])
-
-
-def _edges(spans: Ints) -> Floats:
-    """left, top, right, bottom of spans of pixels (first column, last column, first row, last row)."""
-    return np.asarray(spans[:, [0, 2, 1, 3]] + np.array([-0.5, -0.5, 0.5, 0.5]))
-
-
-def _edge_noise(spans: Ints, rng: np.random.Generator) -> Floats:
-    size = np.maximum(spans[:, [1, 3]] - spans[:, [0, 2]] + 1, 1)
-    return np.asarray(rng.normal(0.0, _EDGE_SPREAD, (len(spans), 4)) * np.tile(size, 2))
 
 
 def _false_boxes(camera: Camera, half: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:

@@ -22,8 +22,7 @@ from stseg.io.outputs.whole_files import make_folder, write_file, write_page
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.reporting.figures import Figure, backdrop
-from stseg.reporting.page.html import figures, note, png_bytes, section, table
-from stseg.reporting.page.template import STYLE
+from stseg.reporting.page.html import STYLE, figures, note, png_bytes, section, table
 from stseg.reporting.pictures.maps import blind_map
 from stseg.reporting.pictures.overlay import grid_picture
 
