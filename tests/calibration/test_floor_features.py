@@ -10,11 +10,10 @@ from simulated_people import Walking, walking
 
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import cameras_of
-from stseg.calibration.automatic.auto import align_all, merge_views
+from stseg.calibration.automatic.auto import align_all, merge_views, placed_views
 from stseg.calibration.automatic.floor_features import Marks, floor_marks
 from stseg.calibration.automatic.solution import (
     SolvedViews,
-    placed_views,
     refine,
     refine_with_marks,
     single_view_cameras,

@@ -19,13 +19,13 @@ from stseg.calibration.automatic.solution import (
     ROUNDS,
     CalibrationInput,
     SolvedViews,
-    placed_views,
     refine,
     refine_with_marks,
     single_view_cameras,
     view_paths,
 )
 from stseg.calibration.automatic.view_alignment import IDENTITY, Alignment, ViewPaths, align, mirrored, support
+from stseg.calibration.pinhole import moved
 from stseg.errors import SourceError
 
 _STARTS = 4
@@ -105,6 +105,13 @@ _FLOOR_ROUNDS = 2
 """Rounds of floor features: a better rig rectifies the floor better, which finds more features."""
 _FLOOR_CELL = 0.1
 """Cell of the rectified floor, metres."""
+
+
+def placed_views(single_cameras: Sequence[Floats], merged: MergedViews) -> Floats:
+    """All cameras on the ground of the first view, float64 (view, 12)."""
+    back = [merged.placed[k].inverse for k in range(len(single_cameras))]
+    ways = [(float(np.angle(one.factor)), np.array([one.shift.real, one.shift.imag]), abs(one.factor)) for one in back]
+    return np.array([moved(view, *way) for view, way in zip(single_cameras, ways, strict=True)])
 
 
 def steps_of(views: int) -> int:

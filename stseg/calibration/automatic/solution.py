@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.calibration.automatic.auto import MergedViews
 from stseg.calibration.automatic.correspondence import Correspondences, match_endpoints
 from stseg.calibration.automatic.endpoints import Endpoints, even_rows, path_of
 from stseg.calibration.automatic.floor_features import Marks
 from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
 from stseg.calibration.automatic.view_alignment import ViewPaths
 from stseg.calibration.bundle_adjustment import Adjustment, BundleParameters, BundleProblem, adjust, same_make
-from stseg.calibration.pinhole import CLOCK, height_of_head, moved
+from stseg.calibration.pinhole import CLOCK, height_of_head
 
 _GATES = (0.8, 0.6, 0.5, 0.5, 0.5)
 """Correspondence gate of each round, metres."""
@@ -82,13 +81,6 @@ def view_paths(views: CalibrationInput, single_cameras: Sequence[Floats]) -> lis
         place = axis_of_foot(view, size, endpoints.foot, FORWARD)
         paths.append(ViewPaths(endpoints.frame, place[:, 0] + 1j * place[:, 1], path_of(endpoints, views.frame_rate)))
     return paths
-
-
-def placed_views(single_cameras: Sequence[Floats], merged: MergedViews) -> Floats:
-    """All cameras on the ground of the first view, float64 (view, 12)."""
-    back = [merged.placed[k].inverse for k in range(len(single_cameras))]
-    ways = [(float(np.angle(one.factor)), np.array([one.shift.real, one.shift.imag]), abs(one.factor)) for one in back]
-    return np.array([moved(view, *way) for view, way in zip(single_cameras, ways, strict=True)])
 
 
 def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> SolvedViews:
