@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints, Shorts, Singles
-from stseg.bodies.pillars import LEVELS, SILHOUETTE, BodyTable, fill_discs
+from stseg.bodies.pillars import SILHOUETTE, BodyTable, fill_discs
 from stseg.kernels.accelerate import kernel, part
 
 # Innermost loops have unsigned places: whether one is negative, and counts from the end, is not asked there.
@@ -53,10 +53,7 @@ def outlines(
     wide = np.ones(len(ground)) if widths is None else widths
     spans = np.zeros((len(ground), shape[0], 2), np.int16)
     place = np.ascontiguousarray(ground, float)
-    _fill_outlines(
-        table.pixel, place, table.origin, heights, wide, LEVELS[1], table.step, SILHOUETTE, float(step), shape[1],
-        first, count, spans, area,
-    )  # fmt: skip
+    _fill_outlines(table, place, heights, wide, float(step), shape[1], first, count, spans, area)
     return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area
 
 
@@ -102,23 +99,16 @@ def sums_inside(
         Of what counts, and pixels of the whole outline; both 0 where the view does not see the pillar.
     """
     sums, area = np.zeros(heights.shape), np.zeros(heights.shape)
-    _fill_sums(
-        table.pixel, ground, table.origin, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values,
-        owner, number, sums, area,
-    )  # fmt: skip
+    _fill_sums(table, ground, heights, widths, float(step), values, owner, number, sums, area)
     return sums, area
 
 
 @kernel
 def _fill_outlines(
-    pixel: Singles,
+    table: BodyTable,
     ground: Floats,
-    origin: tuple[float, float],
     heights: Floats,
     widths: Floats,
-    level_step: float,
-    step: float,
-    profile: Floats,
     raster_step: float,
     columns: int,
     first: Ints,
@@ -126,12 +116,11 @@ def _fill_outlines(
     spans: Spans,
     area: Floats,
 ) -> None:
-    rows = spans.shape[1]
-    discs, drawn = np.empty((len(profile), 6)), np.empty((len(profile), 6))
+    rows, (discs, drawn) = spans.shape[1], np.empty((2, len(SILHOUETTE), 6))
     low, high = np.empty(rows), np.empty(rows)
     for i in range(len(ground)):
-        x, y = (ground[i, 0] - origin[0]) / step, (ground[i, 1] - origin[1]) / step
-        fill_discs(pixel, x, y, heights[i], level_step, step, profile, discs)
+        x, y = (ground[i, 0] - table.origin[0]) / table.step, (ground[i, 1] - table.origin[1]) / table.step
+        fill_discs(table, x, y, heights[i], SILHOUETTE, discs)
         if _seen(discs):
             area[i] = _fill_drawn(discs, raster_step, widths[i], drawn)
             top, bottom = _draw(drawn, low, high)
@@ -140,14 +129,10 @@ def _fill_outlines(
 
 @kernel
 def _fill_sums(
-    pixel: Singles,
+    table: BodyTable,
     ground: Floats,
-    origin: tuple[float, float],
     heights: Floats,
     widths: Floats,
-    level_step: float,
-    step: float,
-    profile: Floats,
     raster_step: float,
     values: Singles,
     owner: Shorts,
@@ -157,12 +142,12 @@ def _fill_sums(
 ) -> None:
     people, pillars = heights.shape
     rows, columns = values.shape
-    discs, drawn = np.empty((len(profile), 6)), np.empty((pillars, len(profile), 6))
+    discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((pillars, len(SILHOUETTE), 6))
     low, high, left_of = np.empty(rows), np.empty(rows), np.empty(rows * (columns + 1))
     for j in range(people):
         for i in range(pillars):
-            x, y = (ground[j, i, 0] - origin[0]) / step, (ground[j, i, 1] - origin[1]) / step
-            fill_discs(pixel, x, y, heights[j, i], level_step, step, profile, discs)
+            x, y = (ground[j, i, 0] - table.origin[0]) / table.step, (ground[j, i, 1] - table.origin[1]) / table.step
+            fill_discs(table, x, y, heights[j, i], SILHOUETTE, discs)
             if _seen(discs):
                 area[j, i] = _fill_drawn(discs, raster_step, widths[j, i], drawn[i])
         window = _window(drawn, area[j], rows, columns)

@@ -8,7 +8,7 @@ that a lens or a tilt bends the pillar as it bends the image. A disc projects to
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from stseg.kernels.accelerate import kernel
 
 LEVELS = np.linspace(0.0, 2.2, 12)
 """Heights at which the lattice is projected, metres."""
+_LEVEL_STEP = float(LEVELS[1])
 PROFILE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.21], [0.8, 0.23], [0.88, 0.13], [1.0, 0.08]])
 """Relative height and radius (metres) of a body's discs, as detectors draw boxes: with a margin above the head."""
 SILHOUETTE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.20], [0.8, 0.22], [0.86, 0.11], [0.95, 0.10], [1.0, 0.02]])
@@ -27,8 +28,7 @@ WIDTH = 2 * float(SILHOUETTE[:, 1].max())
 """Width of that silhouette across shoulders and arms, metres. Wider people are wider at all heights."""
 
 
-@dataclass(frozen=True)
-class BodyTable:
+class BodyTable(NamedTuple):
     """Projected lattice of one view.
 
     Attributes
@@ -79,35 +79,29 @@ class BodyTable:
         """Boxes of pillars with a height each, ground (n, 2) and heights (n,) in metres; float64 (n, 4), pixels."""
         filled = np.full((len(ground), 4), np.nan)
         place, tall = np.ascontiguousarray(ground, float), np.asarray(heights, float)
-        _fill_boxes(self.pixel, place, self.origin, tall, LEVELS[1], self.step, PROFILE, filled)
+        _fill_boxes(self, place, tall, filled)
         return filled
 
     def discs(self, ground: Floats, height: float) -> Floats:
         """The discs of one pillar: centre u, v and the Jacobian times radius (2x2), float64 (disc, 6)."""
         filled = np.full((len(PROFILE), 6), np.nan)
         lattice = (np.asarray(ground, float) - self.origin) / self.step
-        fill_discs(self.pixel, lattice[0], lattice[1], height, LEVELS[1], self.step, PROFILE, filled)
+        fill_discs(self, lattice[0], lattice[1], height, PROFILE, filled)
         return filled
 
 
 @kernel
 def fill_discs(
-    pixel: Singles,
-    lattice_x: float,
-    lattice_y: float,
-    height: float,
-    level_step: float,
-    step: float,
-    profile: Floats,
-    filled: Floats,
+    table: BodyTable, lattice_x: float, lattice_y: float, height: float, profile: Floats, filled: Floats
 ) -> None:
     """Fill filled (disc, 6) with each disc's centre u, v and its Jacobian times radius, pixels."""
+    pixel, step = table.pixel, table.step
     levels, rows, columns, _ = pixel.shape
     column = min(max(int(np.floor(lattice_x)), 0), columns - 2)
     row = min(max(int(np.floor(lattice_y)), 0), rows - 2)
     a, b = lattice_x - column, lattice_y - row
     for k in range(len(profile)):
-        z = profile[k, 0] * height / level_step
+        z = profile[k, 0] * height / _LEVEL_STEP
         level = min(max(int(np.floor(z)), 0), levels - 2)
         c = z - level
         for axis in range(2):
@@ -122,23 +116,14 @@ def fill_discs(
 
 
 @kernel
-def _fill_boxes(
-    pixel: Singles,
-    ground: Floats,
-    origin: tuple[float, float],
-    heights: Floats,
-    level_step: float,
-    step: float,
-    profile: Floats,
-    filled: Floats,
-) -> None:
-    discs = np.empty((len(profile), 6))
+def _fill_boxes(table: BodyTable, ground: Floats, heights: Floats, filled: Floats) -> None:
+    discs, origin, step = np.empty((len(PROFILE), 6)), table.origin, table.step
     for i in range(len(ground)):
         x, y = (ground[i, 0] - origin[0]) / step, (ground[i, 1] - origin[1]) / step
-        fill_discs(pixel, x, y, heights[i], level_step, step, profile, discs)
+        fill_discs(table, x, y, heights[i], PROFILE, discs)
         left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
         visible = True
-        for k in range(len(profile)):
+        for k in range(len(PROFILE)):
             wide = math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
             tall = math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
             visible = visible and not np.isnan(wide + tall)

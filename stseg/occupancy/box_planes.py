@@ -19,7 +19,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.arrays import Floats, Ints, Singles
 from stseg.bodies.box_fit import MATCH_LIMIT, half_square
 from stseg.bodies.pillar_index import PillarIndex, run_of
 from stseg.geometry.sampling import Footprints
@@ -118,15 +118,6 @@ def fill_fit(
                 match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
                 prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]
                 fit[h, cell] = max(fit[h, cell], np.float32(prior + match))
-
-
-@kernel
-def mark_fit(fit: Singles, columns: Flags) -> None:
-    """Mark the ground cells, columns bool (cell,), that a box of fit (height, cell) might show."""
-    for h in range(fit.shape[0]):
-        for cell in range(fit.shape[1]):
-            if fit[h, cell] > -np.inf:
-                columns[cell] = True
 
 
 @kernel

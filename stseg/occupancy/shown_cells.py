@@ -18,7 +18,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Bytes, Flags, Floats, Ints, Labels
+from stseg.arrays import AnyArray, Bytes, Flags, Floats, Ints, Labels
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable, sum_of
 from stseg.kernels.accelerate import kernel
@@ -114,12 +114,7 @@ class CellTables:
 
     def __init__(self, footprint: Footprints) -> None:
         self.footprint = footprint
-        self.reach: list[Reach] = []
-        for boxes in footprint:
-            blocks = tuple(-(-side // SIDE) for side in boxes.shape[1:3])
-            reach = np.zeros((len(boxes), *blocks, 4), np.int16)
-            _fill_reach(boxes, reach)
-            self.reach.append(reach)
+        self.reach = [_reach(boxes) for boxes in footprint]
         self._cells = _MarkedCells.none()
 
     @cached_property
@@ -187,28 +182,19 @@ def mark_map(reach: Reach, table: SumTable, marked: Flags) -> None:
                     marked[z, j, i] = pixels > _MOST_PIXELS or total != table.lowest * pixels
 
 
-@kernel
-def mark_columns(columns: Flags, marked: Flags) -> None:
-    """Mark the blocks of all planes above ground cells, columns bool (y, x)."""
-    for y in range(columns.shape[0]):
-        for x in range(columns.shape[1]):
-            if columns[y, x]:
-                marked[:, y // SIDE, x // SIDE] = True
+def blocks_of(values: AnyArray, reduced: np.ufunc) -> AnyArray:
+    """Values of cells (plane, y, x, ...) reduced over blocks, (plane, block row, block column, ...)."""
+    rows, columns = (np.arange(0, side, SIDE) for side in values.shape[1:3])
+    return np.asarray(reduced.reduceat(reduced.reduceat(values, rows, 1), columns, 2))
 
 
-@kernel
-def _fill_reach(footprint: Footprints, reach: Reach) -> None:
-    """Fill reach, 0 everywhere before, from the footprints (plane, y, x, 4) of a view."""
-    for z in range(footprint.shape[0]):
-        for y in range(footprint.shape[1]):
-            for x in range(footprint.shape[2]):
-                left, top, width, height = footprint[z, y, x]
-                if width > 0:
-                    box = reach[z, y // SIDE, x // SIDE]
-                    first = box[2] == 0
-                    box[0] = left if first else min(box[0], left)
-                    box[1] = top if first else min(box[1], top)
-                    box[2], box[3] = max(box[2], left + width), max(box[3], top + height)
+def _reach(footprint: Footprints) -> Reach:
+    """The boxes around the footprints (plane, y, x, 4) of a view's blocks."""
+    first, extent = footprint[..., :2], footprint[..., 2:]
+    visible = extent[..., :1] > 0
+    low = blocks_of(np.where(visible, first, np.iinfo(np.int16).max), np.minimum)
+    high = blocks_of(np.where(visible, first + extent, 0), np.maximum)
+    return np.where(high[..., :1] > 0, np.concatenate([low, high], -1), 0).astype(np.int16)
 
 
 @kernel

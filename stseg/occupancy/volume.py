@@ -18,12 +18,12 @@ from stseg.geometry import Rig
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable
-from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match, mark_fit
+from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 from stseg.occupancy.revision import NEAR_PRIOR, prior_log_odds
-from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_columns, mark_map
+from stseg.occupancy.shown_cells import CellTables, ShownCells, blocks_of, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
 from stseg.records.people import Explanation
 from stseg.records.sparse_volume import SparseVolume
@@ -155,12 +155,11 @@ class Occupancy:
 
     def _near_people(self, views: Sequence[_PreparedView | None], near_person: Ints) -> Flags:
         """The blocks above the ground near people, and above the cells that a box might show."""
-        marked, columns = self._tables.nothing_marked(), near_person >= 0
+        columns = near_person >= 0
         for view in views:
             if view is not None and view.fit is not None:
-                mark_fit(view.fit, columns.reshape(-1))
-        mark_columns(columns, marked)
-        return marked
+                columns |= (view.fit > -np.inf).any(0).reshape(columns.shape)
+        return np.broadcast_to(blocks_of(columns[None], np.logical_or), self._tables.reach[0].shape[:3])
 
     def _terms(
         self,

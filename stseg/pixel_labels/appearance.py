@@ -184,7 +184,10 @@ def colour_log_ratios(
     total, weight = (np.zeros(likelihood.background.shape, np.float32) for _ in range(2))
     people, corner = likelihood.people, (likelihood.left, likelihood.top)
     _fill_densities(people, corner, rows, place, image, appearance, density)
-    _add_mixture(people, corner, density, total, weight)
+    for here, values in people.rectangles(corner):
+        shape = total[here].shape
+        total[here] += (people.share[values] * density[values]).reshape(shape)
+        weight[here] += people.share[values].reshape(shape)
     _fill_log_ratios(people, corner, density, total, weight, ratio)
     return ratio
 
@@ -214,19 +217,6 @@ def _fill_densities(
                             off_b = float(image[v - corner[1], u - corner[0], b]) - appearance.mean[t, s, b]
                             square += off_a * off_b * appearance.precision[t, s, a, b]
                     density[i] = peak * np.exp(-0.5 * square) + _OUTLIERS
-                i += 1
-
-
-@kernel
-def _add_mixture(people: Patches, corner: tuple[int, int], density: Singles, total: Singles, weight: Singles) -> None:
-    """Add densities times shares, and shares, of all people to each pixel of the window (v, u)."""
-    left, top = corner
-    for j in range(len(people.edges)):
-        i = people.first[j]
-        for v in range(people.edges[j, 1] - top, people.edges[j, 3] - top):
-            for u in range(people.edges[j, 0] - left, people.edges[j, 2] - left):
-                total[v, u] += people.share[i] * density[i]
-                weight[v, u] += people.share[i]
                 i += 1
 
 

@@ -7,6 +7,10 @@ which j covers the pixel times that in which no nearer pillar does,
     p_j = c_j prod_(i nearer than j) (1 - c_i),      p_0 = prod_i (1 - c_i),
 
 the limit of joint draws.
+
+The coverage c_j is the share of pillars, drawn by place, height and width, that cover a pixel. Draws are the same for
+all people and frames: Roberts' additive recurrence in four dimensions (generalised golden ratio), transformed to normal
+deviates. Such quasi-random points converge faster than random ones, and repeat.
 """
 
 from __future__ import annotations
@@ -23,62 +27,6 @@ from stseg.bodies.outlines import Spans, outlines
 from stseg.bodies.pillars import WIDTH, BodyTable
 from stseg.config import BodyConfig, LabelConfig
 from stseg.kernels.accelerate import kernel
-
-
-class LabelLikelihood(NamedTuple):
-    """Prior shares of the labels at the pixels of an image window.
-
-    Attributes
-    ----------
-    left, top
-        Corner of the window in the image, pixels.
-    background : float32 (v, u)
-        p_0, 0..1; has the size of the window.
-    people
-        p_j at the pixels of each person's rectangle, in image coordinates.
-    """
-
-    left: int
-    top: int
-    background: Singles
-    people: Patches
-
-    @property
-    def window(self) -> tuple[slice, slice]:
-        """Slices of the window in the image."""
-        rows, columns = self.background.shape
-        return slice(self.top, self.top + rows), slice(self.left, self.left + columns)
-
-
-def visible_shares(patches: Patches, distance: Floats) -> LabelLikelihood:
-    """Visible shares from coverage; distance float64 (n,) of people from the camera, metres."""
-    edges, visible = patches.edges, patches.edges[:, 2] > patches.edges[:, 0]
-    left, top = edges[visible, :2].min(0, initial=np.iinfo(np.int64).max) if visible.any() else (0, 0)
-    right, bottom = edges[:, 2:].max(0, initial=0)
-    background = np.ones((bottom - top, right - left), np.float32)
-    share = patches.share.copy()
-    order = np.argsort(distance, kind="stable")
-    _fill_visible(order, edges, patches.first, int(left), int(top), share, background)
-    return LabelLikelihood(int(left), int(top), background, Patches(edges, patches.first, share))
-
-
-@kernel
-def _fill_visible(
-    order: Ints, edges: Ints, first: Ints, left: int, top: int, share: Singles, background: Singles
-) -> None:  # fmt: skip
-    """Turn coverage into visible shares, in place; `order` by distance."""
-    for j in order:
-        i = first[j]
-        for v in range(edges[j, 1] - top, edges[j, 3] - top):
-            for u in range(edges[j, 0] - left, edges[j, 2] - left):
-                covered = share[i]
-                share[i] = covered * background[v, u]
-                background[v, u] -= share[i]
-                i += 1
-    for v in range(background.shape[0]):
-        for u in range(background.shape[1]):
-            background[v, u] = max(background[v, u], np.float32(0.0))
-
 
 MARGIN = 0.15
 """Margin around the pillars in which pixels of the body may lie, as a share of their height in the image."""
@@ -103,6 +51,15 @@ class Patches(NamedTuple):
     first: Ints
     share: Singles
 
+    def rectangles(self, corner: tuple[int, int] = (0, 0)) -> list[tuple[tuple[slice, slice], slice]]:
+        """Rows and columns of each person's rectangle in a window with a corner (u, v), and the place of its values."""
+        edges = (self.edges - np.tile(corner, 2)).tolist()
+        ends = zip(self.first[:-1].tolist(), self.first[1:].tolist(), strict=True)
+        return [
+            ((slice(top, bottom), slice(left, right)), slice(*values))
+            for (left, top, right, bottom), values in zip(edges, ends, strict=True)
+        ]
+
 
 def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig, body: BodyConfig) -> Patches:
     """Share of each person's draws that cover each pixel of a view."""
@@ -113,8 +70,7 @@ def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig, 
     widths = (body.width_mean + body.width_spread * deviates[:, 3]).clip(_THINNEST * body.width_mean) / WIDTH
     size = table.size
     first, spans, _ = outlines(table, ground.reshape(-1, 2), heights.ravel(), 1, size[::-1], np.tile(widths, count))
-    edges = np.zeros((count, 4), np.int64)
-    _fill_edges(first, spans, config.samples, MARGIN, size[0], size[1], edges)
+    edges = _edges(first, spans, config.samples, size)
     begin = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
     share = np.zeros(begin[-1], np.float32)
     _fill_shares(first, spans, config.samples, edges, begin, share)
@@ -131,20 +87,18 @@ def _deviates(draws: int) -> Floats:
     return np.asarray(ndtri((0.5 + np.arange(draws)[:, None] * steps) % 1.0))
 
 
-@kernel
-def _fill_edges(first: Ints, spans: Spans, draws: int, margin: float, width: int, height: int, edges: Ints) -> None:
-    """Fill edges (person, 4) with the rectangles around all draws of each person, margin included."""
-    for j in range(len(edges)):
-        left, top, right, bottom = width, height, 0, 0
-        for d in range(j * draws, (j + 1) * draws):
-            for k in range(spans.shape[1]):
-                if first[d] >= 0 and spans[d, k, 1] > spans[d, k, 0]:
-                    left, right = min(left, int(spans[d, k, 0])), max(right, int(spans[d, k, 1]))
-                    top, bottom = min(top, int(first[d]) + k), max(bottom, int(first[d]) + k + 1)
-        if right > left:
-            around = int(np.ceil(margin * (bottom - top)))
-            edges[j, 0], edges[j, 1] = max(left - around, 0), max(top - around, 0)
-            edges[j, 2], edges[j, 3] = min(right + around, width), min(bottom + around, height)
+def _edges(first: Ints, spans: Spans, draws: int, size: tuple[int, int]) -> Ints:
+    """The rectangles around all draws of each person, margin included, within an image of a size; int64 (person, 4)."""
+    drawn = (first[:, None] >= 0) & (spans[..., 1] > spans[..., 0])
+    row = first[:, None] + np.arange(spans.shape[1])
+    low = np.stack([np.where(drawn, spans[..., 0], size[0]), np.where(drawn, row, size[1])], -1)
+    high = np.stack([np.where(drawn, spans[..., 1], 0), np.where(drawn, row + 1, 0)], -1)
+    of_person = len(first) // draws, draws * spans.shape[1], 2
+    low, high = low.reshape(of_person).min(1), high.reshape(of_person).max(1)
+    around = np.ceil(MARGIN * (high - low)[:, 1:]).astype(np.int64)
+    edges = np.concatenate([np.maximum(low - around, 0), np.minimum(high + around, size)], 1).astype(np.int64)
+    edges[high[:, 0] <= low[:, 0]] = 0
+    return edges
 
 
 @kernel
@@ -185,3 +139,45 @@ class PlacedPeople:
 
     def __len__(self) -> int:
         return len(self.ground)
+
+
+class LabelLikelihood(NamedTuple):
+    """Prior shares of the labels at the pixels of an image window.
+
+    Attributes
+    ----------
+    left, top
+        Corner of the window in the image, pixels.
+    background : float32 (v, u)
+        p_0, 0..1; has the size of the window.
+    people
+        p_j at the pixels of each person's rectangle, in image coordinates.
+    """
+
+    left: int
+    top: int
+    background: Singles
+    people: Patches
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Slices of the window in the image."""
+        rows, columns = self.background.shape
+        return slice(self.top, self.top + rows), slice(self.left, self.left + columns)
+
+
+def visible_shares(patches: Patches, distance: Floats) -> LabelLikelihood:
+    """Visible shares from coverage; distance float64 (n,) of people from the camera, metres."""
+    edges, visible = patches.edges, patches.edges[:, 2] > patches.edges[:, 0]
+    left, top = edges[visible, :2].min(0, initial=np.iinfo(np.int64).max) if visible.any() else (0, 0)
+    right, bottom = edges[:, 2:].max(0, initial=0)
+    background = np.ones((bottom - top, right - left), np.float32)
+    share = patches.share.copy()
+    rectangles = patches.rectangles((int(left), int(top)))
+    for j in np.argsort(distance, kind="stable"):
+        here, values = rectangles[j]
+        visible_share = share[values].reshape(background[here].shape) * background[here]
+        background[here] -= visible_share
+        share[values] = visible_share.ravel()
+    np.maximum(background, 0, out=background)
+    return LabelLikelihood(int(left), int(top), background, Patches(edges, patches.first, share))

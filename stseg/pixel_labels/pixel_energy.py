@@ -19,7 +19,7 @@ from stseg.config import LabelConfig
 from stseg.graphcut.expansion import BACKGROUND, LabelEnergy
 from stseg.graphcut.grid_energy import QUANTUM
 from stseg.kernels.accelerate import kernel
-from stseg.pixel_labels.label_likelihood import LabelLikelihood
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, Patches
 
 
 @dataclass(frozen=True)
@@ -59,34 +59,35 @@ def pixel_energy(
     colour : float32 (m,)
         a of each person at the pixels of the rectangle, nats; None without colours.
     """
-    edges = prior.people.edges - np.tile([prior.left, prior.top], 2)
-    patches = (edges, prior.people.first, prior.people.share, prior.background)
-    edge_sums = _edge_sums(across, down)
-    cost = np.empty(len(prior.people.share), np.int64)
-    _fill_costs(*patches, foreground, config.foreground_weight, config.outlier_rate / (len(edges) + 1), QUANTUM, cost)
-    count, node = np.zeros(foreground.shape, np.int64), np.full(foreground.shape, -1, np.int64)
+    people, edge_sums = prior.people, _edge_sums(across, down)
+    cost, outliers = np.empty(len(people.share), np.int64), config.outlier_rate / (len(people.edges) + 1)
+    _fill_costs(people, (prior.left, prior.top), prior.background, foreground, config.foreground_weight, outliers, cost)
     if colour is not None:
         cost -= np.rint(colour / QUANTUM).astype(np.int64)
-    _count_labels(edges, cost, edge_sums, count)
+    rectangles = people.rectangles((prior.left, prior.top))
+    costs = [cost[values].reshape(edge_sums[here].shape) for here, values in rectangles]
+    allowed = [cost_of < edge_sums[here] for cost_of, (here, _) in zip(costs, rectangles, strict=True)]
+    count, node = np.zeros(foreground.shape, np.int64), np.full(foreground.shape, -1, np.int64)
+    for labelled, (here, _) in zip(allowed, rectangles, strict=True):
+        count[here] += labelled
     pixel = np.flatnonzero(count)
     node.flat[pixel] = np.arange(len(pixel))
     first = np.append(0, np.cumsum(count.flat[pixel]))
-    label, price = np.empty(first[-1], np.int64), np.empty(first[-1], np.int64)
-    start, end, weight = (np.empty(2 * len(pixel), np.int64) for _ in range(3))
-    border = np.zeros(len(pixel), np.int64)
-    edges_filled = _fill_neighbours(node, across, down, start, end, weight, border)
-    _fill_labels(edges, cost, edge_sums, node, border, first[:-1].copy(), label, price)
-    return PixelEnergy(
-        pixel, LabelEnergy(first, label, price, start[:edges_filled], end[:edges_filled], weight[:edges_filled])
-    )
+    start, end, weight, border = _neighbours(node, len(pixel), across, down)
+    label, price = np.empty((2, first[-1]), np.int64)
+    free = first[:-1].copy()  # the next entry of each pixel
+    for j, (cost_of, labelled, (here, _)) in enumerate(zip(costs, allowed, rectangles, strict=True)):
+        p = node[here][labelled]
+        label[free[p]], price[free[p]] = j + 1, cost_of[labelled] + border[p]
+        free[p] += 1
+    return PixelEnergy(pixel, LabelEnergy(first, label, price, start, end, weight))
 
 
 def most_likely_labels(prior: LabelLikelihood) -> Ints:
     """Label of greatest likelihood at each pixel of the window (eq. 24), int64 (v, u)."""
     best, label = prior.background.copy(), np.zeros(prior.background.shape, np.int64)
-    for j, (left, top, right, bottom) in enumerate(prior.people.edges.tolist()):
-        here = np.s_[top - prior.top : bottom - prior.top, left - prior.left : right - prior.left]
-        share = prior.people.share[prior.people.first[j] : prior.people.first[j + 1]].reshape(best[here].shape)
+    for j, (here, values) in enumerate(prior.people.rectangles((prior.left, prior.top))):
+        share = prior.people.share[values].reshape(best[here].shape)
         label[here][share > best[here]] = j + 1
         np.maximum(best[here], share, out=best[here])
     return label
@@ -110,78 +111,23 @@ def _edge_sums(across: Labels, down: Labels) -> Labels:
 
 @kernel
 def _fill_costs(
-    edges: Ints,
-    first: Ints,
-    share: Singles,
+    people: Patches,
+    corner: tuple[int, int],
     background: Singles,
     foreground: Singles,
     detection: float,
     outlier_share: float,
-    quantum: float,
     cost: Ints,
 ) -> None:
     """Fill the cost of each person at each pixel of the rectangle, relative to the background, quanta."""
+    (left, top), edges = corner, people.edges
     for j in range(len(edges)):
-        i = first[j]
-        for v in range(edges[j, 1], edges[j, 3]):
-            for u in range(edges[j, 0], edges[j, 2]):
-                likelihood = np.log((background[v, u] + outlier_share) / (share[i] + outlier_share))
-                cost[i] = round((detection * (1.0 - 2.0 * foreground[v, u]) + likelihood) / quantum)
+        i = people.first[j]
+        for v in range(edges[j, 1] - top, edges[j, 3] - top):
+            for u in range(edges[j, 0] - left, edges[j, 2] - left):
+                likelihood = np.log((background[v, u] + outlier_share) / (people.share[i] + outlier_share))
+                cost[i] = round((detection * (1.0 - 2.0 * foreground[v, u]) + likelihood) / QUANTUM)
                 i += 1
-
-
-@kernel
-def _count_labels(edges: Ints, cost: Ints, edge_sums: Labels, count: Ints) -> None:
-    """Fill the number of admissible people at each pixel (v, u)."""
-    i = 0
-    for j in range(len(edges)):
-        for v in range(edges[j, 1], edges[j, 3]):
-            for u in range(edges[j, 0], edges[j, 2]):
-                if cost[i] < edge_sums[v, u]:
-                    count[v, u] += 1
-                i += 1
-
-
-@kernel
-def _fill_labels(
-    edges: Ints, cost: Ints, edge_sums: Labels, node: Ints, border: Ints, free: Ints, label: Ints, price: Ints
-) -> None:  # fmt: skip
-    """Fill the admissible labels of each pixel, ascending, and costs; `free` is each pixel's next free entry."""
-    i = 0
-    for j in range(len(edges)):
-        for v in range(edges[j, 1], edges[j, 3]):
-            for u in range(edges[j, 0], edges[j, 2]):
-                if cost[i] < edge_sums[v, u]:
-                    p = node[v, u]
-                    label[free[p]], price[free[p]] = j + 1, cost[i] + border[p]
-                    free[p] += 1
-                i += 1
-
-
-@kernel
-def _fill_neighbours(
-    node: Ints, across: Labels, down: Labels, start: Ints, end: Ints, weight: Ints, border: Ints
-) -> int:  # fmt: skip
-    """Fill the edges between nodes and the weights of edges to other pixels; number of edges."""
-    edges_filled = 0
-    rows, columns = node.shape
-    for v in range(rows):
-        for u in range(columns):
-            for axis in range(2):
-                to_v, to_u = v + axis, u + 1 - axis
-                if to_v == rows or to_u == columns:
-                    continue
-                p, q = node[v, u], node[to_v, to_u]
-                w = down[v, u] if axis == 1 else across[v, u]
-                if p >= 0 and q >= 0:
-                    if w > 0:
-                        start[edges_filled], end[edges_filled], weight[edges_filled] = p, q, w
-                        edges_filled += 1
-                elif p >= 0:
-                    border[p] += w
-                elif q >= 0:
-                    border[q] += w
-    return edges_filled
 
 
 _FARTHEST = 3 * 255**2
@@ -211,8 +157,15 @@ def edge_costs(image: Bytes | None, shape: tuple[int, int], config: LabelConfig)
     if image is None:
         across[:, :-1] = down[:-1] = round(config.boundary_weight * config.colourless_factor / QUANTUM)
     else:
-        _fill_edge_costs(image, _table(config), across, down)
+        table = _table(config)
+        across[:, :-1] = table[_squared_distance(image[:, 1:], image[:, :-1])]
+        down[:-1] = table[_squared_distance(image[1:], image[:-1])]
     return across, down
+
+
+def _squared_distance(one: Bytes, other: Bytes) -> Labels:
+    """Squared distance of colours (v, u, 3), int32 (v, u)."""
+    return np.asarray(np.square(one.astype(np.int32) - other).sum(-1, dtype=np.int32))
 
 
 @lru_cache(maxsize=8)
@@ -222,21 +175,13 @@ def _table(config: LabelConfig) -> Labels:
     return np.asarray(np.rint(costs / QUANTUM), np.int32)
 
 
-@kernel
-def _fill_edge_costs(image: Bytes, table: Labels, across: Labels, down: Labels) -> None:
-    rows, columns, _ = image.shape
-    for v in range(rows):
-        for u in range(columns):
-            if u + 1 < columns:
-                across[v, u] = table[_square(image, v, u, v, u + 1)]
-            if v + 1 < rows:
-                down[v, u] = table[_square(image, v, u, v + 1, u)]
-
-
-@kernel
-def _square(image: Bytes, v: int, u: int, other_v: int, other_u: int) -> int:
-    total = 0
-    for channel in range(3):
-        off = int(image[v, u, channel]) - int(image[other_v, other_u, channel])
-        total += off * off
-    return total
+def _neighbours(node: Ints, nodes: int, across: Labels, down: Labels) -> tuple[Ints, Ints, Ints, Ints]:
+    """Edges between nodes: start, end and weight, int64 (edge,); and each node's weights to other pixels, (node,)."""
+    beside = np.full((*node.shape, 2), -1, np.int64)
+    beside[:, :-1, 0], beside[:-1, :, 1] = node[:, 1:], node[1:]
+    weight, own = np.stack([across, down], -1).astype(np.int64), np.broadcast_to(node[..., None], beside.shape)
+    joined, border = (own >= 0) & (beside >= 0) & (weight > 0), np.zeros(nodes, np.int64)
+    for one, other in ((own, beside), (beside, own)):
+        outside = (one >= 0) & (other < 0)
+        np.add.at(border, one[outside], weight[outside])
+    return own[joined], beside[joined], weight[joined], border

@@ -27,7 +27,6 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.bodies.outlines import WHOLE_SHARE, Spans
 from stseg.bodies.views import BoxView, PixelView, ViewObservation
 from stseg.config import BodyConfig, ErrorRateConfig
-from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
 from stseg.records.forgetting import Forgetting
 from stseg.records.predicted_tracks import PredictedTracks
@@ -141,41 +140,26 @@ class _ExpectedPeople:
         visible = bodies if foreground is not None else bodies.at(np.zeros(0, np.int64))
         first, spans, area = view.whole_outlines(visible.ground, visible.height, visible.width)
         self._outlines = first, spans, np.zeros((0, 0), bool) if foreground is None else foreground
-        found, pixels = self._found(_IN_PLACE)
+        found, pixels = found_pixels(*self._outlines, _IN_PLACE)
         self._whole = np.flatnonzero(pixels > WHOLE_SHARE * area)
         self.share = found[0, self._whole] / pixels[self._whole]
 
     def __len__(self) -> int:
         return len(self._whole)
 
-    def _found(self, shifts: Ints) -> tuple[Ints, Ints]:
-        """Foreground pixels inside outlines by shifts (n, 2) along v and u, int64 (n, body), and all pixels (body,)."""
-        number = len(self._outlines[0])
-        found, pixels = np.empty((len(shifts), number), np.int64), np.empty(number, np.int64)
-        _fill_found(*self._outlines, shifts, found, pixels)
-        return found, pixels
-
     def gain(self) -> float:
         """Gain of the best shift by all people."""
-        found, pixels = self._found(_SHIFTS)
+        found, pixels = found_pixels(*self._outlines, _SHIFTS)
         gains = ((found / np.maximum(pixels, 1))[:, self._whole] - self.share).clip(-_GAIN_BOUND, _GAIN_BOUND)
         return float(gains.sum(1).max())
 
 
-@kernel
-def _fill_found(first: Ints, spans: Spans, foreground: Flags, shifts: Ints, found: Ints, pixels: Ints) -> None:
-    """Fill found (n, body) with the foreground pixels inside outlines (body,) by shifts (n, 2), and pixels with all."""
+def found_pixels(first: Ints, spans: Spans, foreground: Flags, shifts: Ints) -> tuple[Ints, Ints]:
+    """Foreground pixels inside outlines (body,) shifted by (n, 2) along v and u, int64 (n, body); all (body,)."""
     rows, columns = foreground.shape
-    found[:] = 0
-    for j in range(len(first)):
-        pixels[j] = 0
-        for k in range(spans.shape[1]):
-            pixels[j] += max(spans[j, k, 1] - spans[j, k, 0], 0)
-    for i in range(len(shifts)):
-        for j in range(len(first)):
-            for k in range(spans.shape[1]):
-                v = first[j] + k + shifts[i, 0]
-                if 0 <= v < rows:
-                    left, right = spans[j, k, 0] + shifts[i, 1], spans[j, k, 1] + shifts[i, 1]
-                    for u in range(max(left, 0), min(right, columns)):
-                        found[i, j] += foreground[v, u]
+    left_of = np.pad(foreground, ((0, 1), (1, 0))).cumsum(1)  # the last row, without any, stands for those outside
+    v = first[:, None] + np.arange(spans.shape[1]) + shifts[:, 0, None, None]
+    v[(v < 0) | (v >= rows)] = rows
+    left, right = ((spans[..., k] + shifts[:, 1, None, None]).clip(0, columns) for k in range(2))
+    pixels = (spans[..., 1] - spans[..., 0]).clip(0).sum(1, dtype=np.int64)
+    return (left_of[v, np.maximum(left, right)] - left_of[v, left]).sum(2), pixels

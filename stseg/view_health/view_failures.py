@@ -26,10 +26,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Flags, Ints
+from stseg.arrays import Flags
 from stseg.bodies.views import BoxView, PixelView, ViewObservation
 from stseg.config import BodyConfig, ErrorRateConfig
-from stseg.kernels.accelerate import kernel
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation
 from stseg.records.predicted_tracks import PredictedTracks
@@ -168,25 +167,11 @@ def informedness(assignment: NDArray[np.int16], certain: Flags, foreground: Flag
     """
     if not certain.any():
         return 0, 0.0
-    people, rest = np.zeros((len(certain), 2), np.int64), np.zeros(2, np.int64)
-    _fill_counts(assignment, certain, foreground, people, rest)
-    visible = people[people[:, 0] > 0]
+    person = assignment + 1  # 0 for none
+    pixels, occupied = (
+        np.bincount(counted.ravel(), minlength=len(certain) + 1) for counted in (person, person[foreground])
+    )
+    visible = 1 + np.flatnonzero(certain & (pixels[1:] > 0))
     if not len(visible):
         return 0, 0.0
-    return len(visible), float((visible[:, 1] / visible[:, 0]).mean() - rest[1] / max(int(rest[0]), 1))
-
-
-@kernel
-def _fill_counts(assignment: NDArray[np.int16], certain: Flags, foreground: Flags, people: Ints, rest: Ints) -> None:
-    """Fill the pixels, and the foreground ones, of each certain person (person, 2), and of no person (2,)."""
-    number, occupied = 0, 0
-    for v in range(assignment.shape[0]):
-        for u in range(assignment.shape[1]):
-            person = assignment[v, u]
-            if person < 0:
-                number += 1
-                occupied += foreground[v, u]
-            elif certain[person]:
-                people[person, 0] += 1
-                people[person, 1] += foreground[v, u]
-    rest[0], rest[1] = number, occupied
+    return len(visible), float((occupied[visible] / pixels[visible]).mean() - occupied[0] / max(int(pixels[0]), 1))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -96,6 +94,6 @@ def test_an_outline_beside_the_camera_stays_on_the_raster() -> None:
     for low, high in ((2.5e9, 2.3e19), (-2.3e19, 2.5e9), (1e20, 100.0)):
         pixel = table.pixel.copy()
         pixel[:middle, ..., 1], pixel[middle:, ..., 1] = low, high
-        first, spans, _ = outlines(replace(table, pixel=pixel), PLACES, np.full(len(PLACES), 1.7), 4, (240, 320))
+        first, spans, _ = outlines(table._replace(pixel=pixel), PLACES, np.full(len(PLACES), 1.7), 4, (240, 320))
         assert ((first >= -1) & (first < 240)).all()
         assert ((spans >= 0) & (spans <= 320)).all()

@@ -17,7 +17,7 @@ from stseg.config import ErrorRateConfig
 from stseg.detection.detector import Detector
 from stseg.noise.estimates import Estimates
 from stseg.view_health.blind_views import FrozenViews
-from stseg.view_health.knocked_views import KnockedViews, _fill_found
+from stseg.view_health.knocked_views import KnockedViews, found_pixels
 from stseg.view_health.view_failures import informedness
 
 STANDING = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
@@ -191,8 +191,8 @@ def test_found_is_the_foreground_inside_shifted_outlines(seed: int) -> None:
     foreground, first = rng.random((9, 11)) < 0.5, rng.integers(0, 5, 3)
     left = rng.integers(0, 8, (3, 4))
     spans = np.stack([left, left + rng.integers(0, 4, left.shape)], -1).astype(np.int16)
-    shifts, found, pixels = rng.integers(-6, 7, (5, 2)), np.empty((5, 3), np.int64), np.empty(3, np.int64)
-    _fill_found(first, spans, foreground, shifts, found, pixels)
+    shifts = rng.integers(-6, 7, (5, 2))
+    found, pixels = found_pixels(first, spans, foreground, shifts)
     outlines = np.zeros((3, 29, 31), bool)
     for j, row, (start, stop) in ((j, row, spans[j, row]) for j in range(3) for row in range(4)):
         outlines[j, 10 + first[j] + row, 10 + start : 10 + stop] = True
