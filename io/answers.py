@@ -29,10 +29,7 @@ class AnswerRow:
 def read_answers(path: Path, actions: tuple[str, ...]) -> list[AnswerRow]:
     """Answers of a CSV file with the columns action, frame, id, other, name, in any order.
 
-    Raises
-    ------
-    FormatError
-        Where the file is none; names the line.
+    FormatError where the file is none; names the line.
     """
     found = []
     for line, cells in _lines(path, ("action", "id")):

@@ -9,13 +9,7 @@ from stseg.errors import ConfigError
 
 
 def load_extra(library: str, extra: str) -> Any:
-    """Import a module of one of the extras in pyproject.toml.
-
-    Raises
-    ------
-    ConfigError
-        Where it is not installed.
-    """
+    """Import a module of one of the extras in pyproject.toml. ConfigError where it is not installed."""
     try:
         return import_module(library)
     except ImportError as error:

@@ -176,10 +176,7 @@ def _shape_in_words(shape: tuple[int, ...]) -> str:
 def parse_toml(text: str) -> dict[str, Any]:
     """The top table of a TOML text.
 
-    Raises
-    ------
-    ValueError
-        Where it is no TOML, too long or nested too deeply; its message is one line.
+    ValueError where it is no TOML, too long or nested too deeply; its message is one line.
     """
     if len(text) > limits.TEXT_FILE:
         raise ValueError(f"{len(text)} characters, more than {limits.TEXT_FILE}")

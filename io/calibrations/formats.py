@@ -83,10 +83,7 @@ FORMATS: Mapping[str, CalibrationFormat] = {
 def read_cameras(format: str, files: Sequence[Path], options: ImportOptions) -> list[ForeignCamera]:
     """The cameras of files that belong together, in one of `FORMATS`.
 
-    Raises
-    ------
-    FormatError, CalibrationError, ConfigError
-        Where the files are not of that format, or their numbers make no cameras.
+    FormatError, CalibrationError, ConfigError where the files are not of that format, or their numbers make no cameras.
     """
     place = " + ".join(map(str, files))
     try:

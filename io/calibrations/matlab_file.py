@@ -34,10 +34,7 @@ class _Element(NamedTuple):
 def parse_mat(data: bytes) -> Mapping[str, Floats]:
     """Real numeric matrices by name, float64 (rows, columns); arrays of other kinds are left out.
 
-    Raises
-    ------
-    ValueError
-        Where the bytes are no MAT-file of version 5; the message is one line.
+    ValueError where the bytes are no MAT-file of version 5; the message is one line.
     """
     if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
         raise ValueError("no MAT-file of version 5 to 7.3 (MATLAB's -v6, -v7 or -v7.3)")

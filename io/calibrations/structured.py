@@ -24,10 +24,7 @@ _LONGEST_YAML, _DEEPEST_YAML = 1 << 18, 50
 def read_krt_json(files: Sequence[Path]) -> list[ForeignCamera]:
     """Cameras by name, each with `K` (9 numbers), `RT` (12) and `imgSize`: `shelf` and `campus`.
 
-    Raises
-    ------
-    FormatError
-        Where a file is no such JSON.
+    FormatError where a file is no such JSON.
     """
     return [camera for file in files for camera in _krt(_table(file, parse_json, "JSON"))]
 
@@ -46,10 +43,7 @@ def read_pose_toml(files: Sequence[Path]) -> list[ForeignCamera]:
 
     aniposelib, FreeMoCap and Pose2Sim write them as `[cam_0]` beside `[metadata]`, caliscope as `[cameras.0]`.
 
-    Raises
-    ------
-    FormatError
-        Where a file is no such TOML, or a lens is a fisheye.
+    FormatError where a file is no such TOML, or a lens is a fisheye.
     """
     return [camera for file in files for camera in _poses(_table(file, parse_toml, "TOML"))]
 
@@ -80,10 +74,7 @@ def read_nvidia_json(files: Sequence[Path]) -> list[ForeignCamera]:
     A sensor that has a homography alone does not say which way is up: give its `imageCoordinates` and
     `globalCoordinates` to `stseg calibrate points`.
 
-    Raises
-    ------
-    FormatError
-        Where a file is no such JSON, or a sensor has no camera matrix.
+    FormatError where a file is no such JSON, or a sensor has no camera matrix.
     """
     return [camera for file in files for camera in _sensors(_table(file, parse_json, "JSON"))]
 
@@ -120,12 +111,8 @@ def _side(value: object) -> int | None:
 def read_kalibr_yaml(files: Sequence[Path]) -> list[ForeignCamera]:
     """Kalibr's camera chain: the world is the first camera's own, every other hangs on the one before it.
 
-    Raises
-    ------
-    FormatError
-        Where a file is no such chain, or a lens is neither `radtan` nor `none`.
-    ConfigError
-        Where PyYAML is not installed.
+    FormatError where a file is no such chain, or a lens is neither `radtan` nor `none`; ConfigError where PyYAML is not
+    installed.
     """
     load: Callable[[str], object] = load_extra("yaml", "kalibr").safe_load
 

@@ -31,13 +31,7 @@ _HEIGHTS = (0.3, 60.0)  # metres, range of camera heights
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """Unit, upward axis and handedness of a calibration.
-
-    Raises
-    ------
-    ConfigError
-        Where the unit is unknown.
-    """
+    """Unit, upward axis and handedness of a calibration. ConfigError where the unit is unknown."""
 
     unit: str = "m"
     """Unit of length: mm, cm, m, or a number of metres."""
@@ -72,10 +66,7 @@ class World:
 
         The matrix is scaled so that the third coordinate is the depth in metres where it is a calibrated camera's.
 
-        Raises
-        ------
-        CalibrationError
-            Where the matrix is not that of a camera.
+        CalibrationError where the matrix is not that of a camera.
         """
         in_metres = foreign.projection @ self.from_metres
         depth = float(np.linalg.norm(in_metres[2, :3]))
@@ -96,10 +87,7 @@ def guess_up(cameras: Sequence[ForeignCamera]) -> Up:
 def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False) -> str:
     """The unit in which camera heights are most plausible.
 
-    Raises
-    ------
-    CalibrationError
-        Where the cameras are below the ground in any unit.
+    CalibrationError where the cameras are below the ground in any unit.
     """
     height = median_height(cameras, World("m", up, mirrored))
     if height <= 0:

@@ -62,10 +62,7 @@ def read_opencv_xml(files: Sequence[Path]) -> list[ForeignCamera]:
 def read_opencv_lens(file: Path) -> Lens:
     """The lens of a camera whose XML has at least `camera_matrix` and `distortion_coefficients`.
 
-    Raises
-    ------
-    FormatError
-        Where the file is no such XML.
+    FormatError where the file is no such XML.
     """
     roots = [(file, parse_xml(file, "XML of OpenCV's FileStorage"))]
     _, matrix = _numbers(roots, _MATRIX, (9,))
@@ -107,10 +104,7 @@ def _numbers(
 def read_tsai_xml(files: Sequence[Path]) -> list[ForeignCamera]:
     """One camera a file, `<Camera>` with `<Geometry>`, `<Intrinsic>` and `<Extrinsic>`.
 
-    Raises
-    ------
-    FormatError
-        Where a file is no such XML, or a number is missing or none.
+    FormatError where a file is no such XML, or a number is missing or none.
     """
     return [_read_tsai(file) for file in files]
 

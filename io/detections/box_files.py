@@ -191,10 +191,8 @@ def _is_number(text: str) -> bool:
 def read_features(path: Path, detections: int) -> Singles:
     """Features of the detections of one file, in its order, float32 (detection, feature).
 
-    Raises
-    ------
-    SourceError, FormatError
-        Where the file cannot be read, or has another number of rows, or numbers that are not finite.
+    SourceError, FormatError where the file cannot be read, or has another number of rows, or numbers that are not
+    finite.
     """
     try:
         array = read_npy(path)

@@ -43,10 +43,7 @@ NAMES = (
 def read_detections(request: Request) -> tuple[str, Detections] | None:
     """Recognise a file or folder by its content and read it; None for the plain text forms of `read_boxes`.
 
-    Raises
-    ------
-    SourceError, FormatError
-        Where it cannot be read or is of no known format; names the place.
+    SourceError, FormatError where it cannot be read or is of no known format; names the place.
     """
     path = request.path
     with _of_form(path, "detections"):

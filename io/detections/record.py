@@ -164,10 +164,7 @@ def number(path: Path, place: str, name: str, value: object) -> float:
 def read_json(path: Path) -> Any:
     """Parsed JSON; of JSON lines, the list of the lines.
 
-    Raises
-    ------
-    SourceError, FormatError
-        Where the file cannot be read, or is no JSON: names the line.
+    SourceError, FormatError where the file cannot be read, or is no JSON: names the line.
     """
     try:
         text = read_text(path, limits.DETECTIONS_FILE)

@@ -142,10 +142,7 @@ def _box(pixel: Floats, size: tuple[int, int]) -> Polygons:
 def appearance_axes(recording: Recording) -> Floats | None:
     """Principal axes of all cameras' features, float64 (feature, FEATURES or less); None where boxes have none.
 
-    Raises
-    ------
-    SourceError, FormatError
-        Where a file cannot be read, or cameras have features of different lengths.
+    SourceError, FormatError where a file cannot be read, or cameras have features of different lengths.
     """
     samples = list[Singles]()
     for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True):

@@ -52,10 +52,7 @@ class FFmpegCapture:
 
     Its options are those of the environment variable OPENCV_FFMPEG_CAPTURE_OPTIONS where it is set, else `_OPTIONS`.
 
-    Raises
-    ------
-    OSError
-        Where there is no such stream.
+    OSError where there is no such stream.
     """
 
     def __init__(self, address: str, silence: float) -> None:
@@ -201,10 +198,7 @@ def now() -> float:
 def is_live(recording: Recording) -> bool:
     """Whether the cameras of a recording are live streams; False where its videos arrive as files.
 
-    Raises
-    ------
-    SourceError
-        Where its sources are neither, or mixed.
+    SourceError where its sources are neither, or mixed.
     """
     sources = [source.source for source in recording.sources]
     live = any(source.address for source in sources)

@@ -233,13 +233,7 @@ _RECEIVERS: dict[str, Callable[[SplitResult], Receiver]] = {
 
 
 def receiver_of(address: str) -> Receiver:
-    """The receiver at an address.
-
-    Raises
-    ------
-    ConfigError
-        Where it is none, or its library is not installed.
-    """
+    """The receiver at an address. ConfigError where it is none, or its library is not installed."""
     try:
         parts = urlsplit(address)
         whole = bool(parts.hostname) and parts.port != 0 and not parts.fragment

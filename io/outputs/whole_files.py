@@ -92,10 +92,7 @@ def sync_folder(path: Path) -> None:
 def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
     """A temporary path to write to, renamed to `path` at the end unless an exception was raised.
 
-    Raises
-    ------
-    OutputError
-        Where the file exists and is not to be overwritten, or cannot be written.
+    OutputError where the file exists and is not to be overwritten, or cannot be written.
     """
     require_new(path, overwrite)
     part: Path | None = None
@@ -158,10 +155,7 @@ def output_error(path: Path, error: OSError) -> OutputError:
 def write_page(path: Path, page: str, overwrite: bool = True) -> None:
     """Write an HTML page, whole or not at all.
 
-    Raises
-    ------
-    OutputError
-        Where the file exists and is not to be overwritten, or cannot be written.
+    OutputError where the file exists and is not to be overwritten, or cannot be written.
     """
     write_file(path, page.encode("utf-8"), overwrite)
 

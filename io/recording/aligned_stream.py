@@ -92,10 +92,7 @@ def open_aligned_stream(
 ) -> AlignedStream:
     """One camera's stream, aligned as the recording says; with `times` known, distant frames are sought.
 
-    Raises
-    ------
-    SourceError, FormatError
-        Where the source is missing, empty or not of its kind.
+    SourceError, FormatError where the source is missing, empty or not of its kind.
     """
     camera, source = recording.rig.cameras[camera_index], recording.sources[camera_index]
     stream = open_stream(source.source, camera, times, recording.factors[camera_index])
@@ -192,10 +189,7 @@ def count_frames(recording: Recording) -> int:
 def index_streams(recording: Recording) -> StreamIndex:
     """Index a recording: its number of frames, their stamps and the alignment of its cameras, by decoding all.
 
-    Raises
-    ------
-    SourceError, FormatError
-        Where a source is missing, empty or not of its kind, or the streams do not end together.
+    SourceError, FormatError where a source is missing, empty or not of its kind, or the streams do not end together.
     """
     with ExitStack() as opened:
         streams = open_aligned_streams(recording, opened)

@@ -18,10 +18,7 @@ _NUMBER = re.compile(r"(\d+)", re.ASCII)
 def source_parts(source: Source, key: str) -> list[Source]:
     """One source for each file or folder that is a stream of its own.
 
-    Raises
-    ------
-    SourceError
-        Where a pattern of videos matches no file.
+    SourceError where a pattern of videos matches no file.
     """
     paths = [part for path in (source.path, *source.more) for part in _expanded(path, source.kind, key)]
     return [replace(source, path=path, more=(), starts=()) for path in paths]

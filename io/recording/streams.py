@@ -175,10 +175,7 @@ def open_stream(
     With the time stamps of all frames, from `Stream.times`, a video is not decoded up to a distant frame. Colour frames
     are reduced by a whole factor (`stseg.io.recording.pictures.reduced_view`).
 
-    Raises
-    ------
-    SourceError, FormatError
-        Where the source is missing, empty or not of its kind.
+    SourceError, FormatError where the source is missing, empty or not of its kind.
     """
     if source.address:
         raise SourceError(

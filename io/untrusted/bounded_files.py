@@ -18,12 +18,8 @@ from stseg.io.untrusted import limits
 def read_bytes(path: Path, most: int = limits.TEXT_FILE) -> bytes:
     """The bytes of a regular file.
 
-    Raises
-    ------
-    OSError
-        Where it cannot be read.
-    ValueError
-        Where it is no regular file, or longer than `most`; the message is one line.
+    OSError where it cannot be read; ValueError where it is no regular file, or longer than `most`; the message is one
+    line.
     """
     with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
         state = os.fstat(file.fileno())

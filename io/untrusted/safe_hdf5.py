@@ -55,12 +55,8 @@ def hdf5_file(path: Path | str, mode: Literal["r", "r+"]) -> h5py.File:
 def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """An HDF5 file, open for reading, all of whose objects stand in it.
 
-    Raises
-    ------
-    OSError
-        Where it cannot be read.
-    ValueError
-        Where it leads out of itself, has too many objects, or heaps without an end; the message is one line.
+    OSError where it cannot be read; ValueError where it leads out of itself, has too many objects, or heaps without an
+    end; the message is one line.
     """
     if not path.is_file():
         raise FileNotFoundError(2, "no such file", str(path))

@@ -36,10 +36,7 @@ _TEXT_VIDEO = b"YUV4MPEG2"
 def open_video(path: Path, key: str) -> cv2.VideoCapture:
     """A local video file, open.
 
-    Raises
-    ------
-    SourceError
-        Where it is no regular file, text, nothing that FFmpeg opens, or of larger frames than are read.
+    SourceError where it is no regular file, text, nothing that FFmpeg opens, or of larger frames than are read.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
@@ -96,10 +93,7 @@ def _is_text(head: bytes) -> bool:
 def read_video_size(path: Path) -> tuple[int, int]:
     """Width and height of a video's first frame, pixels.
 
-    Raises
-    ------
-    SourceError
-        Where the file is missing or nothing of it decodes.
+    SourceError where the file is missing or nothing of it decodes.
     """
     capture = open_video(path, "")
     try:

@@ -102,10 +102,7 @@ def concatenate_files(
     Without `starts` a file begins one period after the last frame of the previous one. Where that equals its number of
     frames up to rounding it is exactly that number, so that splitting a recording changes nothing.
 
-    Raises
-    ------
-    SourceError
-        Where a file starts before the previous one has ended.
+    SourceError where a file starts before the previous one has ended.
     """
     begin, parts = 0.0, list[Floats]()
     for k, stamps in enumerate(files):

@@ -63,10 +63,7 @@ def to_data_frame(table: Rows, frame_rate: float, cameras: Sequence[str]) -> Dat
 
     Texts become strings; a column with one value a view becomes one column a camera, `NAME_CAMERA`.
 
-    Raises
-    ------
-    ConfigError
-        Where pandas is not installed.
+    ConfigError where pandas is not installed.
     """
     pandas = load_extra("pandas", "pandas")
     columns = dict(_columns(table, cameras))

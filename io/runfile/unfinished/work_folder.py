@@ -127,10 +127,7 @@ class WorkFolder:
     def publish(self, overwrite: bool) -> None:
         """Give the finished run file its name; the folder keeps it too, until it is removed.
 
-        Raises
-        ------
-        OutputError
-            Where the output has appeared meanwhile, or cannot be written; the result stays in the folder.
+        OutputError where the output has appeared meanwhile, or cannot be written; the result stays in the folder.
         """
         try:
             try:
