@@ -21,6 +21,22 @@ from stseg.io.recording.streams import open_stream
 SIZE = (80, 60)
 BOXES = {0: [(10.0, 12.0, 20.0, 30.0, 0.9)], 2: [(5.0, 6.0, 10.0, 24.0, 0.5), (40.0, 8.0, 16.0, 40.0, 0.25)]}
 """By frame: left, top, width, height, score."""
+RIG = """format = 1
+[scene]
+name = "s"
+frame_rate = 5.0
+x = [-1.0, 1.0]
+y = [-1.0, 1.0]
+[grid]
+cell = 0.1
+top = 1.8
+planes = 3
+[[camera]]
+name = "a"
+size = [80, 60]
+projection = [[40.0, 0, -39.5, 200], [0, -40.0, -29.5, 150], [0, 0, -1.0, 5]]
+source = { kind = "boxes", path = "PATH" }
+"""
 Writer = Callable[[Path], Source]
 
 
@@ -350,23 +366,7 @@ def test_images_at_equal_steps_are_consecutive_frames() -> None:
 def test_the_rig_names_a_wrong_key(tmp_path: Path) -> None:
     from stseg.io.recording.rigs import read_recording
 
-    text = f"""format = 1
-[scene]
-name = "s"
-frame_rate = 5.0
-x = [-1.0, 1.0]
-y = [-1.0, 1.0]
-[grid]
-cell = 0.1
-top = 1.8
-planes = 3
-[[camera]]
-name = "a"
-size = [80, 60]
-projection = [[40.0, 0, -39.5, 200], [0, -40.0, -29.5, 150], [0, 0, -1.0, 5]]
-source = {{ kind = "boxes", path = "x.json", SOURCE }}
-images = {{ kind = "video", path = "x.mp4" }}
-"""  # noqa: F541
+    text = RIG.replace('"PATH"', '"x.json", SOURCE') + 'images = { kind = "video", path = "x.mp4" }\n'
     path = tmp_path / "rig.toml"
     path.write_text(text.replace("SOURCE", 'classes = ["person"], score = 0.3, columns = { frame = "t" }'))
     (own,) = read_recording(path).sources
@@ -385,22 +385,7 @@ def test_inspect_says_what_a_rig_delivers_and_draws_it(
     monkeypatch.setenv("COLUMNS", "200")
     yolo_text(tmp_path)
     rig = tmp_path / "rig.toml"
-    rig.write_text("""format = 1
-[scene]
-name = "s"
-frame_rate = 5.0
-x = [-1.0, 1.0]
-y = [-1.0, 1.0]
-[grid]
-cell = 0.1
-top = 1.8
-planes = 3
-[[camera]]
-name = "a"
-size = [80, 60]
-projection = [[40.0, 0, -39.5, 200], [0, -40.0, -29.5, 150], [0, 0, -1.0, 5]]
-source = { kind = "boxes", path = "labels" }
-""")
+    rig.write_text(RIG.replace("PATH", "labels"))
     inspect(rig, output=tmp_path / "pictures")
     printed = capsys.readouterr().out
     assert "Ultralytics text" in printed and "person 3, car 2" in printed

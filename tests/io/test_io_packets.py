@@ -93,15 +93,20 @@ def test_a_video_that_breaks_off_has_the_frames_that_decode(tmp_path: Path, film
         np.testing.assert_array_equal(counted(path), times)
 
 
-@pytest.mark.parametrize("frame", [0, 4, 8])
-@pytest.mark.parametrize("at", [0, 2, 4, 30, 170, 300, 640, 700])
-def test_a_damaged_picture_is_counted_as_it_decodes(tmp_path: Path, film: bytes, frame: int, at: int) -> None:
+def damaged(folder: Path, film: bytes, frame: int, at: int) -> Path:
+    """The film with twelve other bytes in a frame."""
     begin = -1
     for _ in range(frame + 1):
         begin = film.index(b"00dc", begin + 1)
     begin += 8 + at
-    path = tmp_path / "film.avi"
-    path.write_bytes(film[:begin] + b"\xaa" * 12 + film[begin + 12 :])
+    (folder / "film.avi").write_bytes(film[:begin] + b"\xaa" * 12 + film[begin + 12 :])
+    return folder / "film.avi"
+
+
+@pytest.mark.parametrize("frame", [0, 4, 8])
+@pytest.mark.parametrize("at", [0, 2, 4, 30, 170, 300, 640, 700])
+def test_a_damaged_picture_is_counted_as_it_decodes(tmp_path: Path, film: bytes, frame: int, at: int) -> None:
+    path = damaged(tmp_path, film, frame, at)
     if len(decoded(path)):
         np.testing.assert_array_equal(counted(path), decoded(path))
     else:
@@ -129,12 +134,7 @@ def test_reduced_pictures_are_the_means_of_squares_nearly(tmp_path: Path, factor
 @pytest.mark.parametrize("frame", [0, 4, 8])
 @pytest.mark.parametrize("at", [0, 2, 30, 170, 640])
 def test_a_damaged_picture_leaves_the_reduced_frames(tmp_path: Path, film: bytes, frame: int, at: int) -> None:
-    begin = -1
-    for _ in range(frame + 1):
-        begin = film.index(b"00dc", begin + 1)
-    begin += 8 + at
-    path = tmp_path / "film.avi"
-    path.write_bytes(film[:begin] + b"\xaa" * 12 + film[begin + 12 :])
+    path = damaged(tmp_path, film, frame, at)
     times = decoded(path)
     stream = VideoStream(Source("video", path), CAMERA, times, factor=2)
     shown = 0

@@ -1,4 +1,4 @@
-"""Tables of positions as CSV."""
+"""Numbers from text, and tables of positions as CSV."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from refusals import refused
 
 from stseg.errors import FormatError, OutputError
 from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
+from stseg.io.untrusted.values import parse_number, parse_whole
 from stseg.records.tables import TRAJECTORY
 
 
@@ -117,3 +118,19 @@ def test_files_that_are_no_text_are_refused(path: Path) -> None:
 
 def test_a_place_that_cannot_be_written_is_named(path: Path) -> None:
     refused(OutputError, "nowhere", write_tracks_csv, path.parent / "nowhere" / "tracks.csv", trajectory([]))
+
+
+@pytest.mark.parametrize("text", ["1_000", "٣", "inf", "nan", "1e999", "0x1", "", " ", "1" * 500, "1e", "--1"])
+def test_what_is_no_number(text: str) -> None:
+    assert np.isnan(parse_number(text))
+
+
+@pytest.mark.parametrize("text", ["1", " -1.5 ", "+.5", "5.", "1e-3", "1E5"])
+def test_numbers_are_read_as_python_reads_them(text: str) -> None:
+    assert parse_number(text) == float(text)
+
+
+def test_whole_numbers_are_within_their_range() -> None:
+    assert parse_whole("7", 0, 9) == 7
+    assert parse_whole("10", 0, 9) is None
+    assert parse_whole("1" * 5000, 0, 9) is None
