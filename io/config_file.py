@@ -77,12 +77,7 @@ def format_config(config: Config) -> str:
 def describe_config(config: Config, *, expert: bool) -> str:
     """The configuration as TOML with a comment above each key; `read_config` of it gives back the same.
 
-    Parameters
-    ----------
-    config
-        The values.
-    expert
-        Whether constants of the methods stand there as well, not only keys for users and values that were changed.
+    With `expert`, constants of the methods stand there as well, not only keys for users and values that were changed.
     """
     defaults, given, model = dict(values(Config())), dict(values(config)), config.foreground.model
 
@@ -167,16 +162,9 @@ def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
 
 
 def as_toml(settings: Any, table: str = "", comment: Callable[[str], str | None] | None = None) -> str:
-    """The TOML text of settings; `build` of it gives back the same.
+    """The TOML text of settings in a table (full name; empty at the top); `build` of it gives back the same.
 
-    Parameters
-    ----------
-    settings
-        The dataclass.
-    table
-        Full name of its table; empty at the top.
-    comment
-        Comment above a key, which is given in full; None to leave the key out.
+    `comment` gives the comment above a key, which is given in full; None to leave the key out.
     """
     lines, tables = [], []
     for field in fields(settings):

@@ -118,23 +118,10 @@ class _Sheet:
 def read_rows(
     path: Path, needed: Sequence[str], most: int, *, skip_blanks: bool = False
 ) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header and first rows of a CSV file, each row with the number of its line.
+    """Header and first rows of a CSV file, `most` of them, each with the number of its line.
 
-    Parameters
-    ----------
-    path
-        The file.
-    needed
-        Columns that the header must have.
-    most
-        Rows that are read.
-    skip_blanks
-        Whether blanks before a quotation mark are no part of the text.
-
-    Raises
-    ------
-    FormatError
-        Where the file cannot be read, or a column is missing.
+    With `skip_blanks`, blanks before a quotation mark are no part of the text. FormatError where the file cannot be
+    read, or lacks one of the columns `needed`.
     """
     try:
         require_regular(path)

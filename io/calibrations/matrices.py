@@ -30,17 +30,9 @@ _SAMPLES = 9  # pixels along each side of the image at which the head plane is s
 
 
 def read_projection(files: Sequence[Path]) -> list[ForeignCamera]:
-    """One camera a file, from the one 3x4 matrix in it.
+    """One camera a file, from the one 3x4 matrix in it; FormatError where it does not hold exactly one.
 
-    Parameters
-    ----------
-    files
-        The suffix says the format: .txt or .csv (twelve numbers, row by row, with blanks or commas), .npy, .npz, .mat.
-
-    Raises
-    ------
-    FormatError
-        Where a file does not hold exactly one such matrix.
+    The suffix says the format: .txt or .csv (twelve numbers, row by row, with blanks or commas), .npy, .npz, .mat.
     """
     return [_read(file) for file in files]
 
@@ -98,24 +90,12 @@ _READERS: dict[str, Callable[[Path], Mapping[str, AnyArray]]] = {
 
 
 def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[ForeignCamera]:
-    """One camera.
+    """One camera of an image `size` (width, height), pixels.
 
-    Parameters
-    ----------
-    files
-        Text with the ground homography and then the head homography, or a file of each. Lines of three numbers
-        are read (brackets, commas and semicolons count as blanks), all others ignored.
-    size
-        Width and height of the image, pixels.
-    head
-        Height of the head plane, in sides of the ground's cells.
-
-    Raises
-    ------
-    FormatError
-        Where there are not two matrices.
-    CalibrationError
-        Where they are no planes that a camera sees.
+    The head plane is `head` sides of the ground's cells high. The files are a text with the ground homography and
+    then the head homography, or one of each. Lines of three numbers are read (brackets, commas and semicolons count
+    as blanks), all others ignored. FormatError where there are not two matrices; CalibrationError where they are no
+    planes that a camera sees.
     """
     rows = [row for file in files for row in _rows(file)]
     names = " + ".join(map(str, files))

@@ -35,16 +35,8 @@ class PointTable:
 def read_points(path: Path) -> list[PointTable]:
     """The points of every camera, in the order in which the file first names them.
 
-    Parameters
-    ----------
-    path
-        CSV with a header; z, where there is such a column, may be empty for points on the ground. Further columns are
-        ignored.
-
-    Raises
-    ------
-    FormatError
-        Where the file cannot be read, a column is missing, or a cell is no number.
+    The file is CSV with a header; z, where there is such a column, may be empty for points on the ground. Further
+    columns are ignored. FormatError where the file cannot be read, a column is missing, or a cell is no number.
     """
     rows: dict[str, list[tuple[int, list[float]]]] = {}
     header, given = read_rows(path, _NEEDED, limits.POINTS + 1, skip_blanks=True)

@@ -39,16 +39,9 @@ _ROUNDS = 3
 def read_opencv_xml(files: Sequence[Path]) -> list[ForeignCamera]:
     """One camera, P = K [R | t], with its lens unless the distortion is zero.
 
-    Parameters
-    ----------
-    files
-        The XML file, or two that share the nodes between them: `camera_matrix` and `distortion_coefficients`,
-        `rotation_vectors` or `rvec` (Rodrigues) and `translation_vectors` or `tvec`.
-
-    Raises
-    ------
-    FormatError
-        Where a file is no such XML, or a node is missing, twice there, or of the wrong length.
+    The nodes `camera_matrix`, `distortion_coefficients`, `rotation_vectors` or `rvec` (Rodrigues) and
+    `translation_vectors` or `tvec` stand in one file, or are shared between two. FormatError where a file is no such
+    XML, or a node is missing, twice there, or of the wrong length.
     """
     roots = [(file, parse_xml(file, "XML of OpenCV's FileStorage")) for file in files]
     file, matrix = _numbers(roots, _MATRIX, (9,))

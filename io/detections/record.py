@@ -86,13 +86,7 @@ class Detections:
 
 
 class DetectionList:
-    """Collects detections one by one, and refuses what is no box.
-
-    Parameters
-    ----------
-    path
-        The file, for errors.
-    """
+    """Collects detections of a file one by one, and refuses what is no box."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

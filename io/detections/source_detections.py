@@ -45,19 +45,10 @@ class SourceDetections:
 
 
 def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:
-    """Read a source of boxes, or of instances that are no images.
+    """Read a source of boxes, or of instances that are no images, for an image `size` (width, height), pixels.
 
-    Parameters
-    ----------
-    source
-        Its path may be any format of `stseg.io.detections.formats`.
-    size
-        Width and height of the camera's image, pixels.
-
-    Raises
-    ------
-    SourceError, FormatError
-        Where it cannot be read, or has no detections.
+    Its path may be any format of `stseg.io.detections.formats`. SourceError, FormatError where it cannot be read, or
+    has no detections.
     """
     return _read(source, size, _stamp(source.path, *([source.appearance] if source.appearance else [])))
 

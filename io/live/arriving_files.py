@@ -27,13 +27,7 @@ _POLL = 0.1
 
 
 class FileNotes:
-    """The files of each camera that were read to their ends, with their numbers of frames; kept in a file.
-
-    Parameters
-    ----------
-    path
-        The file; its contents are continued.
-    """
+    """The files of each camera that were read to their ends, with their numbers of frames; kept in a file."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._lock = path, Lock()

@@ -22,26 +22,15 @@ _IDS = 1 << 31
 
 
 class LiveTable:
-    """A CSV table to which each window appends its tracks, flushed at once.
+    """A CSV table, `frame_rate` frames per second, to which each window appends its tracks, flushed at once.
 
-    Parameters
-    ----------
-    path
-        The file. Lines of an unfinished run in it are kept.
-    frame_rate
-        Frames per second.
-    stop
-        Lines of frames from `stop` on are removed.
+    Lines of an unfinished run in the file are kept, those of frames from `stop` on removed. Raises OutputError where it
+    cannot be written, from every method.
 
     Attributes
     ----------
     rows : TRAJECTORY (n,)
         The kept lines: frame, id, x, y.
-
-    Raises
-    ------
-    OutputError
-        Where it cannot be written; from every method.
     """
 
     def __init__(self, path: Path, frame_rate: float, stop: int) -> None:
@@ -84,22 +73,13 @@ class LiveTable:
 class CorrectionTable:
     """A CSV table to which each decision appends its corrections; there is no file before the first.
 
-    Parameters
-    ----------
-    path
-        The file. Lines of an unfinished run in it are kept.
-    stop
-        Lines decided with frames from `stop` on are removed.
+    Lines of an unfinished run in the file are kept, those decided with frames from `stop` on removed. Raises
+    OutputError where it cannot be written, from every method.
 
     Attributes
     ----------
     rows : CORRECTION (n,)
         The kept lines.
-
-    Raises
-    ------
-    OutputError
-        Where it cannot be written; from every method.
     """
 
     def __init__(self, path: Path, stop: int) -> None:

@@ -36,15 +36,9 @@ _EXPECTED = "mqtt://HOST[:PORT]/TOPIC, ws://HOST/PATH, wss://HOST/PATH, http://H
 
 
 class Publisher:
-    """Sends rows of tracks to a receiver while it is open.
+    """Sends rows of tracks to a receiver while it is open, at a rate of frames per second.
 
-    Parameters
-    ----------
-    receiver
-    frame_rate
-        Frames per second.
-    report
-        Receives a line when the receiver stops to answer, when it is back, and of what was dropped.
+    `report` receives a line when the receiver stops to answer, when it is back, and of what was dropped.
     """
 
     def __init__(self, receiver: Receiver, frame_rate: float, report: Callable[[str], None]) -> None:

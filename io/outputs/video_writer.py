@@ -22,23 +22,10 @@ def require_film_name(path: Path) -> None:
 
 
 def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwrite: bool) -> int:
-    """Write pictures as an MP4 file (MPEG-4 part 2), whole or not at all, and count them.
+    """Write pictures as an MP4 file (MPEG-4 part 2), whole or not at all, and count them; raises OutputError.
 
-    Parameters
-    ----------
-    path
-        Ends in .mp4.
-    pictures : uint8 (v, u, 3), one or more
-        Blue, green, red; all of one size.
-    frame_rate
-        Frames per second.
-    overwrite
-        Whether an older file may be replaced.
-
-    Raises
-    ------
-    OutputError
-        Where the file cannot be written.
+    The pictures are one or more, uint8 (v, u, 3), blue, green, red, all of one size; the path ends in .mp4, and an
+    older file is replaced where `overwrite` says so.
     """
     require_film_name(path)
     require_utf8(path, "a video")

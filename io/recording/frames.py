@@ -164,21 +164,8 @@ def read_camera(
 ) -> Iterator[Observation]:
     """Observations of one camera in some frames of the recording, decoded on demand; None where it is blind.
 
-    Parameters
-    ----------
-    recording
-        The rig and its streams.
-    camera_index
-        The camera, in the rig's order.
-    frames
-        Numbers of the recording's frames, rising.
-    streams
-        From `index_streams`, to align frames in time and seek distant ones.
-
-    Raises
-    ------
-    SourceError, FormatError
-        Where the source is missing, broken or not of the camera's size.
+    The frames rise; with `streams`, from `index_streams`, they are aligned in time and distant ones sought.
+    SourceError, FormatError where the source is missing, broken or not of the camera's size.
     """
     if streams:
         recording = with_alignment(recording, streams.frame_at_tick)
@@ -192,17 +179,7 @@ def read_camera(
 def read_background(recording: Recording, camera_index: int) -> Iterator[Observation]:
     """One camera's frames of the empty scene, decoded on demand.
 
-    Parameters
-    ----------
-    recording
-        The rig and its streams.
-    camera_index
-        The camera, in the rig's order.
-
-    Raises
-    ------
-    SourceError
-        Where the camera has no background, or it is missing, broken or not of the camera's size.
+    SourceError where the camera has no background, or it is missing, broken or not of the camera's size.
     """
     camera, background = recording.rig.cameras[camera_index], recording.sources[camera_index].background
     if background is None:

@@ -167,18 +167,7 @@ def declares_more(data: bytes) -> bool:
 
 
 def decode_indexed(data: bytes) -> AnyArray | None:
-    """The numbers of a PNG for which `stores_numbers` holds.
-
-    Parameters
-    ----------
-    data
-        The file.
-
-    Returns
-    -------
-    uint8 (v, u)
-        0..2^bits - 1, or None where the file is broken.
-    """
+    """The numbers of a PNG for which `stores_numbers` holds, uint8 (v, u), 0..2^bits - 1; None for a broken file."""
     try:
         with Image.open(BytesIO(data), formats=("PNG",)) as image:
             values = np.asarray(image, np.uint8)
@@ -190,14 +179,7 @@ def decode_indexed(data: bytes) -> AnyArray | None:
 
 
 def encode_indexed(numbers: Bytes, palette: Bytes) -> bytes:
-    """An indexed PNG of 8 bits.
-
-    Parameters
-    ----------
-    numbers : uint8 (v, u)
-    palette : uint8 (256, 3)
-        Red, green, blue of each number.
-    """
+    """An indexed PNG of 8 bits: numbers uint8 (v, u), palette uint8 (256, 3) with red, green, blue of each number."""
     image, file = Image.fromarray(numbers), BytesIO()
     image.putpalette(palette.tobytes())
     image.save(file, "PNG", bits=8)

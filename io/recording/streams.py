@@ -37,15 +37,7 @@ class Stream(Protocol):
 
 
 class CountedStream:
-    """Frames of known number that have no time stamps; nothing is held open.
-
-    Parameters
-    ----------
-    frames
-        Number of frames.
-    read_frame
-        Gives the observation of a frame.
-    """
+    """Frames of known number that have no time stamps, each given by `read_frame`; nothing is held open."""
 
     def __init__(self, frames: int, read_frame: Callable[[int], Observation]) -> None:
         self._frames, self._read_frame, self._next = frames, read_frame, 0
@@ -103,14 +95,8 @@ def open_images(source: Source, camera: Camera, factor: int) -> CountedStream:
 class JoinedStream:
     """Consecutive streams of one camera; one is open at a time.
 
-    Parameters
-    ----------
-    parts, camera
-        One source a file or folder, in chronological order.
-    times
-        Time stamps of the frames of each part, where known.
-    factor
-        Reduction of colour frames.
+    The parts are one source a file or folder, in chronological order, and `times` the stamps of their frames, where
+    known.
     """
 
     def __init__(self, parts: Sequence[Source], camera: Camera, times: Sequence[Floats] | None, factor: int) -> None:

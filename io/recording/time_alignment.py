@@ -145,16 +145,9 @@ def nearest_frames(position: Floats, period: float) -> Ints:
 
 
 def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
-    """Which frames of the recording each camera shows, bool (camera, length).
+    """Which frames of a recording that is aligned in time each camera shows, bool (camera, length).
 
-    Parameters
-    ----------
-    recording
-        The rig and its streams, aligned in time.
-    counts
-        Frames of each camera.
-    length
-        Frames of the recording.
+    `counts` are the numbers of frames of the cameras, `length` that of the recording.
     """
     flags = np.zeros((len(counts), length), bool)
     for flag, source, count in zip(flags, recording.sources, counts, strict=True):

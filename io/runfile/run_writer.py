@@ -95,14 +95,9 @@ class RunWriter:
         self.append_packed_labels([other for _, other in packed])
 
     def append_packed_log_odds(self, frames: Ints, log_odds: Sequence[PackedFrame]) -> None:
-        """Append the log-odds of the next frames, packed for this layout and grid; their labels may come later.
+        """Append the log-odds of the next frames, as of `append_frames`; their labels may come later.
 
-        Parameters
-        ----------
-        frames
-            As of `append_frames`.
-        log_odds
-            One for each frame.
+        They are packed for this layout and grid, one for each frame.
         """
         self._require_later(frames)
         with self._disk.step():

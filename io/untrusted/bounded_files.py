@@ -65,18 +65,9 @@ def is_regular(path: Path) -> bool:
 
 
 def parse_xml(file: Path, expected: str) -> ElementTree.Element:
-    """The root of an XML file.
+    """The root of an XML file of the kind `expected`.
 
-    Parameters
-    ----------
-    file
-    expected
-        The expected kind of XML, for errors.
-
-    Raises
-    ------
-    FormatError
-        Where it cannot be read, is no XML, or declares a document type.
+    FormatError where it cannot be read, is no XML, or declares a document type.
     """
     try:
         text = read_text(file)

@@ -55,19 +55,9 @@ def read_npy(path: Path) -> AnyArray:
 
 
 def read_npz(path: Path, most: int = limits.UNPACKED) -> Mapping[str, AnyArray]:
-    """The arrays of a .npz file by name.
+    """The arrays of a .npz file by name, all together of at most `most` bytes, unpacked.
 
-    Parameters
-    ----------
-    path
-        The file.
-    most
-        Bytes of all members together, unpacked.
-
-    Raises
-    ------
-    OSError, ValueError
-        Where it is no such archive, or larger.
+    OSError, ValueError where it is no such archive, or larger.
     """
     packed = BytesIO(read_bytes(path, most))
     arrays, rest = {}, most

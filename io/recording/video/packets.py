@@ -64,21 +64,9 @@ def decoder_reduction(factor: int) -> int:
 
 
 def decode_reduced(packet: Bytes, size: tuple[int, int], scale: int) -> Bytes | None:
-    """A packet's picture reduced as it is decoded, uint8 (v, u, 3), without its incomplete squares.
+    """A JPEG packet uint8 (byte,) reduced by 2, 4 or 8 as it is decoded, uint8 (v, u, 3) BGR.
 
-    Parameters
-    ----------
-    packet : uint8 (byte,)
-        A JPEG picture.
-    size
-        Width and height that it must have, pixels.
-    scale
-        2, 4 or 8.
-
-    Returns
-    -------
-    uint8 (v, u, 3) or None
-        BGR; None where it does not decode, or has another size.
+    Incomplete squares are left out. None where it does not decode, or has another size (width, height), pixels.
     """
     width, height = size
     picture = cv2.imdecode(packet, _SCALED[scale] | cv2.IMREAD_IGNORE_ORIENTATION)

@@ -51,19 +51,10 @@ _PUBLISHED_FILES = frozenset((_MARK, "lock", "begun.json", "result.h5"))
 
 
 class WorkFolder:
-    """The folder of one output.
+    """The folder of one output, the future run file.
 
-    Parameters
-    ----------
-    output
-        The future run file.
-    request
-        Everything that determines the result, in nested tables; equal to that of the unfinished run.
-
-    Raises
-    ------
-    OutputError
-        Where the folder is not ours, a different run is unfinished or running here, or it cannot be written.
+    The request is everything that determines the result, in nested tables; equal to that of the unfinished run.
+    OutputError where the folder is not ours, a different run is unfinished or running here, or it cannot be written.
     """
 
     def __init__(self, output: Path, request: dict[str, Any]) -> None:
