@@ -131,6 +131,9 @@ GivenTree = Mapping[str, "Given | GivenTree"]
 def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
     """Settings of this kind: what is given, and defaults for the rest.
 
+    ConfigError where a name is unknown, a value of another type, or out of the range that the dataclass itself holds
+    to.
+
     Parameters
     ----------
     kind
@@ -141,11 +144,6 @@ def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
         What to name where a fault lies in no single value.
     table
         Full name of the table that the settings stand in; empty at the top.
-
-    Raises
-    ------
-    ConfigError
-        Where a name is unknown, a value of another type, or out of the range that the dataclass itself holds to.
     """
     hints = get_type_hints(kind)
     values = {}

@@ -72,6 +72,9 @@ def camera_from_pose(
 ) -> ForeignCamera:
     """A camera P = K [R | t], with its lens unless the distortion is zero.
 
+    FormatError where these are no camera matrix, no rotation, or too many coefficients; CalibrationError where R is a
+    mirror.
+
     Parameters
     ----------
     file, name, size
@@ -82,13 +85,6 @@ def camera_from_pose(
         t, lengths of the foreign world.
     distortion : float64 (n,)
         OpenCV's coefficients; those beyond the first eight must be zero.
-
-    Raises
-    ------
-    FormatError
-        Where these are no camera matrix, no rotation, or too many coefficients.
-    CalibrationError
-        Where R is a mirror.
     """
     key = f"camera {name}" if name else "camera"
     if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:

@@ -52,6 +52,8 @@ def read_boxes(
     and, perhaps, score, in any order, among columns that are ignored. MOTChallenge lines have no header: frame, id,
     left, top, width, height, conf, ... between commas or spaces, with conf -1 where it is unknown.
 
+    SourceError where the file cannot be read or has no frames; FormatError where a line is not one of boxes; names it.
+
     Parameters
     ----------
     path
@@ -62,13 +64,6 @@ def read_boxes(
         Number of frames; None to end with the last frame that has a box.
     appearance
         File of their appearance features; None without.
-
-    Raises
-    ------
-    SourceError
-        Where the file cannot be read or has no frames.
-    FormatError
-        Where a line is not one of boxes; names it.
     """
     lines = _read_lines(path)
     _check(lines, first_frame, frames)

@@ -25,6 +25,8 @@ _POLL = 0.2
 class FollowedFiles(AbstractContextManager["FollowedFiles"], Iterator[FrameSet]):
     """Frame sets of a recording whose videos arrive as files, a pattern each (see `stseg.io.live.live_stream.is_live`).
 
+    SourceError where a camera starts after the first frame, or, while iterating, where a video is broken.
+
     Parameters
     ----------
     recording
@@ -39,11 +41,6 @@ class FollowedFiles(AbstractContextManager["FollowedFiles"], Iterator[FrameSet])
         Ends the iteration.
     report
         Receives a line about files that are long awaited.
-
-    Raises
-    ------
-    SourceError
-        Where a camera starts after the first frame, or, while iterating, where a video is broken.
     """
 
     def __init__(

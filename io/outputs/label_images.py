@@ -35,6 +35,8 @@ def require_label_folder(folder: Path, overwrite: bool) -> None:
 class LabelImages:
     """A folder of label images, one folder a camera in it.
 
+    OutputError where the folder holds something already, cannot be written to, or an id is too large.
+
     Parameters
     ----------
     folder
@@ -47,11 +49,6 @@ class LabelImages:
         Red, green, blue of each id.
     overwrite
         Write into a folder that is not empty; older label images of these cameras are deleted.
-
-    Raises
-    ------
-    OutputError
-        Where the folder holds something already, cannot be written to, or an id is too large.
     """
 
     def __init__(self, folder: Path, cameras: Sequence[str], largest: int, palette: Bytes, overwrite: bool) -> None:

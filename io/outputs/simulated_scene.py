@@ -85,7 +85,7 @@ def write_scene(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> None:
-    """Film a scene into a folder.
+    """Film a scene into a folder. OutputError where the folder holds something already, or cannot be written to.
 
     Parameters
     ----------
@@ -101,11 +101,6 @@ def write_scene(
         Write into a folder that is not empty, over files of the same name.
     progress
         Called after each frame.
-
-    Raises
-    ------
-    OutputError
-        Where the folder holds something already, or cannot be written to.
     """
     require_utf8(folder, "a video")
     with _as_output_error(folder):

@@ -132,6 +132,9 @@ def open_frames(
 ) -> FrameReader:
     """Read frames first..stop-1 of a recording, all cameras together.
 
+    SourceError, FormatError where a source is missing, empty or not of its kind, or a camera starts after the first
+    frame; ConfigError where the range is none.
+
     Parameters
     ----------
     recording
@@ -145,13 +148,6 @@ def open_frames(
     -------
     FrameReader
         A context manager that yields one `FrameSet` per frame.
-
-    Raises
-    ------
-    SourceError, FormatError
-        Where a source is missing, empty or not of its kind, or a camera starts after the first frame.
-    ConfigError
-        Where the range is none.
     """
     if first < 0 or (stop is not None and stop < first):
         found = f"{first}:{'' if stop is None else stop}"

@@ -31,6 +31,8 @@ _GREY, _INDEXED = 0, 3
 def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) -> AnyArray:
     """One image file as an observation.
 
+    SourceError where the file cannot be read or decoded, or is not of that kind or size.
+
     Parameters
     ----------
     path
@@ -41,11 +43,6 @@ def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) 
         Width and height that it must have, pixels.
     key
         Camera and frame, for errors.
-
-    Raises
-    ------
-    SourceError
-        Where the file cannot be read or decoded, or is not of that kind or size.
     """
     try:
         data = read_bytes(path, _MOST_BYTES)

@@ -73,17 +73,14 @@ class _CameraTimes:
 def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> TimeAlignment:
     """Align the frames of all cameras in time.
 
+    SourceError where a camera's `clock` is "stamps" and it has none, or `starts` do not fit its files.
+
     Parameters
     ----------
     recording
         The rig and its streams.
     times : float64 (n,) each
         Time stamps of all frames of each file of each camera, milliseconds; nan where there is none.
-
-    Raises
-    ------
-    SourceError
-        Where a camera's `clock` is "stamps" and it has none, or `starts` do not fit its files.
     """
     rate = recording.rig.frame_rate
     cameras = [

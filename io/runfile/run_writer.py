@@ -27,6 +27,8 @@ class RunWriter:
 
     Use it in a `with`: an exception before `finish` removes the part and leaves an older file of that name unchanged.
 
+    OutputError where the file exists and is not to be overwritten, or cannot be written; from every method.
+
     Parameters
     ----------
     path
@@ -41,11 +43,6 @@ class RunWriter:
         Whether an older file of that name may be replaced, at the end.
     kept
         One of `layout.VOLUMES`: the part of the volume that is appended; the rest is NaN and background.
-
-    Raises
-    ------
-    OutputError
-        Where the file exists and is not to be overwritten, or cannot be written; from every method.
     """
 
     def __init__(

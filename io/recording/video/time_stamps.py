@@ -54,6 +54,8 @@ def interpret_stamps(
 
     AVI has a rate and no stamps: the times that decoders give to its B-frames and empty chunks are no clock.
 
+    SourceError where a file starts before the previous one has ended.
+
     Parameters
     ----------
     times : float64 (n,) each
@@ -64,11 +66,6 @@ def interpret_stamps(
         The files.
     starts : float64 (file,)
         Start of each file, seconds; empty where files follow one another.
-
-    Raises
-    ------
-    SourceError
-        Where a file starts before the previous one has ended.
     """
     files = [(stamps - stamps[:1]) / 1000 * frame_rate for stamps in times]
     if not all(np.isfinite(stamps).all() and _rises(np.diff(stamps), _LONGEST_GAP * frame_rate) for stamps in files):

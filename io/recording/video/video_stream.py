@@ -28,6 +28,8 @@ _SEEK_MARGIN = 4
 class VideoStream:
     """Colour frames uint8 (v, u, 3) or, where the source's kind is masks, uint8 (v, u) of a video file.
 
+    SourceError where the file is missing, no frame of it decodes, or its frames have not the camera's size.
+
     Parameters
     ----------
     source, camera
@@ -39,11 +41,6 @@ class VideoStream:
         Whole factor by which colour frames are reduced (`stseg.io.recording.pictures.reduced_view`). Of Motion JPEG
         the decoder makes no more pixels than are asked for, as far as it can: means over squares but for rounding and
         what lies beyond their detail.
-
-    Raises
-    ------
-    SourceError
-        Where the file is missing, no frame of it decodes, or its frames have not the camera's size.
     """
 
     def __init__(self, source: Source, camera: Camera, times: Floats | None = None, factor: int = 1) -> None:

@@ -38,16 +38,13 @@ def read_layers(path: str) -> list[Layer]:
 
     The volume and the labels stay in the file; napari reads the frames that it shows.
 
+    FormatError where the run file is broken.
+
     Returns
     -------
     list of (data, arguments, kind)
         image `log_odds` float32 (time, plane, y, x), labels `label` int32 (time, plane, y, x), and tracks float64
         (n, 5): id, index of the frame, height of the place (0), y, x in metres.
-
-    Raises
-    ------
-    FormatError
-        Where the run file is broken.
     """
     run = read_run(path)
     group = hdf5_file(path, "r")[layout.OCCUPANCY]  # checked by `read_run`; open as long as napari holds the arrays

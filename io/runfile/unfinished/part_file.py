@@ -25,6 +25,8 @@ class PartFile(io.RawIOBase):
     not written is kept in memory, where HDF5 reads it back, and both failures and interrupts (Ctrl-C) are raised at the
     end of the step. All calls of HDF5, closing of datasets included, belong into a `step`.
 
+    OutputError where the part cannot be made, or another process writes one.
+
     Parameters
     ----------
     path
@@ -34,11 +36,6 @@ class PartFile(io.RawIOBase):
     ----------
     part
         The temporary file.
-
-    Raises
-    ------
-    OutputError
-        Where the part cannot be made, or another process writes one.
     """
 
     def __init__(self, path: Path) -> None:
