@@ -8,43 +8,37 @@ from contextlib import contextmanager
 from pathlib import Path
 
 try:
-    from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit, setrlimit
+    import resource
 except ImportError:  # Windows has no such limits
-
-    def address_space() -> int:
-        """Bytes of address space that a process of this user may have."""
-        return _ENDLESS
-
-    @contextmanager
-    def bounded_growth(most: int) -> Iterator[None]:  # noqa: ARG001
-        """Nothing is bounded here."""
-        yield
-else:
-
-    def address_space() -> int:
-        """Bytes of address space that a process of this user may have."""
-        limit, _ = getrlimit(RLIMIT_AS)
-        return _ENDLESS if limit == RLIM_INFINITY else limit
-
-    @contextmanager
-    def bounded_growth(most: int) -> Iterator[None]:
-        """Within, the process cannot take more than `most` bytes of memory beyond what it has; Linux alone knows that.
-
-        For libraries that ask for as much as a file says; threads beside share the bound.
-        """
-        soft, hard = getrlimit(RLIMIT_AS)
-        bound = _held() + most
-        if bound >= min(address_space(), _ENDLESS):
-            yield
-            return
-        setrlimit(RLIMIT_AS, (bound, hard))
-        try:
-            yield
-        finally:
-            setrlimit(RLIMIT_AS, (soft, hard))
-
+    resource = None  # type: ignore[assignment]
 
 _ENDLESS = 1 << 62
+
+
+def address_space() -> int:
+    """Bytes of address space that a process of this user may have."""
+    if resource is None:
+        return _ENDLESS
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return _ENDLESS if limit == resource.RLIM_INFINITY else limit
+
+
+@contextmanager
+def bounded_growth(most: int) -> Iterator[None]:
+    """Within, the process cannot take more than `most` bytes of memory beyond what it has; Linux alone knows that.
+
+    For libraries that ask for as much as a file says; threads beside share the bound.
+    """
+    bound = _held() + most
+    if bound >= min(address_space(), _ENDLESS):
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def _held() -> int:

@@ -22,7 +22,7 @@ from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.geometry import Lens
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
-from stseg.io.outputs.whole_files import replacing
+from stseg.io.outputs.whole_files import write_file
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_xml
 from stseg.io.untrusted.values import parse_numbers, printable
@@ -71,8 +71,7 @@ def write_opencv_lens(path: Path, matrix: Floats, distortion: Floats, overwrite:
         f"  <dt>d</dt>\n  <data>{' '.join(map(repr, rows.ravel().tolist()))}</data>\n</{name}>"
         for name, rows in ((_MATRIX[0], matrix), (_DISTORTION[0], distortion.reshape(-1, 1)))
     )
-    with replacing(path, overwrite) as part:
-        part.write_text(f'<?xml version="1.0"?>\n<opencv_storage>\n{nodes}\n</opencv_storage>\n', encoding="utf-8")
+    write_file(path, f'<?xml version="1.0"?>\n<opencv_storage>\n{nodes}\n</opencv_storage>\n'.encode(), overwrite)
 
 
 def _numbers(

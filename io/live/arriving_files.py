@@ -14,7 +14,7 @@ from stseg.arrays import Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.live.live_stream import now
-from stseg.io.outputs.whole_files import replacing
+from stseg.io.outputs.whole_files import write_file
 from stseg.io.recording.recording import Source
 from stseg.io.recording.source_files import numeric_order
 from stseg.io.recording.video.video_stream import VideoStream
@@ -39,8 +39,7 @@ class FileNotes:
         """Record a file that was read to its end."""
         with self._lock:
             self.read.setdefault(camera, []).append((name, frames))
-            with replacing(self._path, overwrite=True) as part:
-                part.write_text(json.dumps(self.read, indent=1), "utf-8")
+            write_file(self._path, json.dumps(self.read, indent=1).encode())
 
 
 def _checked_notes(notes: object) -> dict[str, list[tuple[str, int]]]:

@@ -10,7 +10,7 @@ from typing import Self, TextIO
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io.outputs.whole_files import output_error, replacing
+from stseg.io.outputs.whole_files import output_errors, replacing
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import parse_number, parse_numbers, parse_whole
 from stseg.records.tables import CORRECTION, TRAJECTORY
@@ -44,10 +44,8 @@ class LiveTable:
         self._file: TextIO | None = None
 
     def __enter__(self) -> Self:
-        try:
+        with output_errors(self.path):
             self._file = self.path.open("a", newline="", encoding="utf-8")
-        except OSError as error:
-            raise output_error(self.path, error) from error
         return self
 
     def __exit__(self, *reason: object) -> None:
@@ -58,11 +56,9 @@ class LiveTable:
         """Add TRAJECTORY rows."""
         if self._file is None:
             raise ValueError("a live table that is not open")
-        try:
+        with output_errors(self.path):
             csv.writer(self._file).writerows(map(self._line, rows))
             self._file.flush()
-        except OSError as error:
-            raise output_error(self.path, error) from error
 
     def _line(self, row: np.void) -> Sequence[object]:
         frame = int(row["frame"])
@@ -93,12 +89,10 @@ class CorrectionTable:
 
     def append(self, rows: Rows) -> None:
         """Add CORRECTION rows."""
-        try:
+        with output_errors(self.path):
             begun = self.path.exists()
             with self.path.open("a", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows([*([] if begun else [COLUMNS]), *rows.tolist()])
-        except OSError as error:
-            raise output_error(self.path, error) from error
 
 
 def _whole_lines(path: Path, stop: int, columns: int, whole: Mapping[int, int]) -> list[list[str]]:

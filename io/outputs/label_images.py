@@ -16,7 +16,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Ints
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import clear_frames, output_error, write_quickly
+from stseg.io.outputs.whole_files import clear_frames, output_errors, write_quickly
 from stseg.io.recording.pictures import encode_indexed
 from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name
 
@@ -25,11 +25,9 @@ _BYTE, _WORD = 255, 65535
 
 def require_label_folder(folder: Path, overwrite: bool) -> None:
     """Refuse a folder that holds something, before any work is done; raises OutputError."""
-    try:
+    with output_errors(folder):
         if folder.exists() and any(folder.iterdir()) and not overwrite:
             raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
-    except OSError as error:
-        raise output_error(folder, error) from error
 
 
 class LabelImages:
@@ -56,19 +54,15 @@ class LabelImages:
             raise OutputError(folder, "", f"a track with the id {largest}", f"ids up to {_WORD}, the most in a PNG")
         self._folder, self._indexed, self._palette = folder, largest <= _BYTE, palette
         require_label_folder(folder, overwrite)
-        try:
+        with output_errors(folder):
             for camera in cameras:
-                self._clear(self._folder_of(camera))
-        except OSError as error:
-            raise output_error(folder, error) from error
+                clear_frames(self._folder_of(camera))
 
     def write(self, camera: str, frame: int, ids: Ints) -> None:
         """Write one image, int64 (v, u); raises OutputError."""
         path = self._folder_of(camera) / f"{frame:06d}.png"
-        try:
+        with output_errors(path):
             write_quickly(path, self._encoded(ids))
-        except OSError as error:
-            raise output_error(path, error) from error
 
     def _encoded(self, ids: Ints) -> bytes:
         if self._indexed:
@@ -79,8 +73,3 @@ class LabelImages:
         if not is_name(camera):
             raise OutputError(self._folder, "camera", abbreviated(camera), EXPECTED)
         return self._folder / camera
-
-    @staticmethod
-    def _clear(folder: Path) -> None:
-        """Make a camera's folder, without the images of an earlier run."""
-        clear_frames(folder)

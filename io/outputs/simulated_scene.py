@@ -159,7 +159,7 @@ class _CameraFiles(AbstractContextManager["_CameraFiles"]):
         rate, paths = scene.rig.frame_rate, _paths(folder, camera)
         self._instances: Path | None = paths["instances"] if instances else None
         if self._instances is not None:
-            _clear(self._instances)
+            clear_frames(self._instances)
         with ExitStack() as stack:
             self._boxes: IO[str] = stack.enter_context(paths["boxes"].open("w", encoding="utf-8"))
             self._videos = dict[str, _Video]()
@@ -225,11 +225,6 @@ def _paths(folder: Path, camera: Camera) -> dict[str, Path]:
         "instances": f"{camera.name}_instances",
     }
     return {kind: folder / name for kind, name in names.items()}
-
-
-def _clear(folder: Path) -> None:
-    """Make a folder for frames, without those of an earlier recording."""
-    clear_frames(folder)
 
 
 @contextmanager

@@ -143,6 +143,15 @@ def _remove_abandoned(path: Path) -> None:
                 part.unlink()
 
 
+@contextmanager
+def output_errors(path: Path) -> Iterator[None]:
+    """Raise the operating system's refusals to write as OutputError, which names the path."""
+    try:
+        yield
+    except OSError as error:
+        raise output_error(path, error) from error
+
+
 def output_error(path: Path, error: OSError) -> OutputError:
     """The error for a refusal of the operating system to write."""
     if isinstance(error, BlockingIOError):

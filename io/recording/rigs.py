@@ -17,7 +17,7 @@ import numpy as np
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.io.detections.tables import COLUMNS
-from stseg.io.outputs.whole_files import replacing
+from stseg.io.outputs.whole_files import write_file
 from stseg.io.recording.recording import (
     SOURCE_KINDS,
     BodyPrior,
@@ -111,8 +111,7 @@ def write_rig(path: str | Path, recording: Recording) -> None:
         data = text.encode("utf-8")
     except UnicodeEncodeError as error:
         raise OutputError(path, "", "a name that UTF-8 cannot hold", "names of readable characters") from error
-    with replacing(path, overwrite=True) as part:
-        part.write_bytes(data)
+    write_file(path, data)
 
 
 def _named(tables: tuple[Table, ...]) -> tuple[Table, ...]:

@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Any
 
 from stseg.errors import ConfigError
-
-
-@dataclass(frozen=True, slots=True)
-class _Range:
-    """Metadata of a field: whether a value is in its range, and the range as an error describes it."""
-
-    holds: Callable[[Any], bool]
-    expected: str
 
 
 class Settings:
@@ -29,8 +21,8 @@ class Settings:
     def __post_init__(self) -> None:
         for one in fields(self):  # type: ignore[arg-type]  # sections are dataclasses
             if "range" in one.metadata:
-                limit = one.metadata["range"]
-                require(limit.holds(getattr(self, one.name)), self, one.name, limit.expected)
+                holds, expected = one.metadata["range"]
+                require(holds(getattr(self, one.name)), self, one.name, expected)
 
 
 def require(holds: bool, settings: object, name: str, expected: str) -> None:
@@ -41,7 +33,7 @@ def require(holds: bool, settings: object, name: str, expected: str) -> None:
 
 def within(default: Any, holds: Callable[[Any], bool], expected: str) -> Any:
     """A field with a default and a range."""
-    return field(default=default, metadata={"range": _Range(holds, expected)})
+    return field(default=default, metadata={"range": (holds, expected)})
 
 
 def positive(default: float, expected: str = "a number above 0") -> Any:

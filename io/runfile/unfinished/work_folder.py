@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Self
 
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import create_part, output_error, publish_part, replacing, require_new, sync_folder
+from stseg.io.outputs.whole_files import create_part, output_error, publish_part, require_new, sync_folder, write_file
 from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.unfinished.part_file import lock
@@ -170,8 +170,7 @@ class WorkFolder:
 
     def keep_clock(self, start: float) -> None:
         """Store the time of frame 0."""
-        with replacing(self.path / "clock.json", overwrite=True) as part:
-            part.write_text(json.dumps(start), "utf-8")
+        write_file(self.path / "clock.json", json.dumps(start).encode())
 
     def remove(self) -> None:
         """Delete the folder, once the output exists; files in it that are not ours stay."""
@@ -229,8 +228,7 @@ class WorkFolder:
         try:
             before = parse_json(read_text(path))
         except FileNotFoundError:
-            with replacing(path, overwrite=True) as part:
-                part.write_text(json.dumps(self._request, indent=1), "utf-8")
+            write_file(path, json.dumps(self._request, indent=1).encode())
             return
         except (OSError, ValueError) as error:
             raise OutputError(path, "", f"what cannot be read ({error})", self._anew("the run's notes")) from error
