@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints
+from stseg.calibration.automatic.correspondence import Correspondences
 from stseg.calibration.automatic.solution import SolvedViews
+from stseg.calibration.bundle_adjustment import BundleParameters
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, SIZE, as_camera, height_of_head, moved, on_plane
 from stseg.geometry import Camera, Grid
 
@@ -41,43 +43,39 @@ class ViewReport:
 
 def scaled(solution: SolvedViews, factor: float) -> SolvedViews:
     """The solution with all lengths multiplied by a factor, covariance included."""
-    parameters = solution.adjustment.parameters
+    parameters, matched = solution.adjustment.parameters, solution.problem.correspondences
     views = np.array([moved(view, 0.0, np.zeros(2), factor) for view in parameters.views])
-    parameters = replace(
-        parameters, views=views, toe_offset=factor * parameters.toe_offset, points=factor * parameters.points
-    )
     scale = np.ones(len(solution.adjustment.covariance))
     for view in range(len(views)):
         scale[SIZE * view + CENTRE.start : SIZE * view + CENTRE.stop] = factor
     scale[-2:] = factor
-    covariance = scale[:, None] * solution.adjustment.covariance * scale
-    correspondences = solution.problem.correspondences
-    correspondences = replace(
-        correspondences, ground=factor * correspondences.ground, velocity=factor * correspondences.velocity
+    return _replaced(
+        solution,
+        replace(parameters, views=views, toe_offset=factor * parameters.toe_offset, points=factor * parameters.points),
+        scale[:, None] * solution.adjustment.covariance * scale,
+        replace(matched, ground=factor * matched.ground, velocity=factor * matched.velocity),
     )
-    adjustment = replace(solution.adjustment, parameters=parameters, covariance=covariance)
-    return replace(solution, adjustment=adjustment, problem=replace(solution.problem, correspondences=correspondences))
 
 
 def centred(solution: SolvedViews) -> SolvedViews:
     """The solution with the origin in the middle of the ground points and x along the first camera's right."""
-    parameters = solution.adjustment.parameters
+    parameters, matched = solution.adjustment.parameters, solution.problem.correspondences
     middle = (parameters.points[:, :2].max(axis=0) + parameters.points[:, :2].min(axis=0)) / 2
     toward = middle - parameters.views[0, CENTRE][:2]
     turn = np.pi / 2 - float(np.arctan2(toward[1], toward[0]))
     about = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     views = np.array([moved(view, turn, -about @ middle, 1.0) for view in parameters.views])
     points = np.column_stack([(parameters.points[:, :2] - middle) @ about.T, parameters.points[:, 2]])
-    parameters = replace(parameters, views=views, points=points)
-    correspondences = solution.problem.correspondences
-    correspondences = replace(
-        correspondences, ground=(correspondences.ground - middle) @ about.T, velocity=correspondences.velocity @ about.T
-    )
-    return replace(
-        solution,
-        adjustment=replace(solution.adjustment, parameters=parameters),
-        problem=replace(solution.problem, correspondences=correspondences),
-    )
+    turned = replace(matched, ground=(matched.ground - middle) @ about.T, velocity=matched.velocity @ about.T)
+    covariance = solution.adjustment.covariance
+    return _replaced(solution, replace(parameters, views=views, points=points), covariance, turned)
+
+
+def _replaced(
+    solution: SolvedViews, parameters: BundleParameters, covariance: Floats, matched: Correspondences
+) -> SolvedViews:
+    adjustment = replace(solution.adjustment, parameters=parameters, covariance=covariance)
+    return replace(solution, adjustment=adjustment, problem=replace(solution.problem, correspondences=matched))
 
 
 def distance_factor(solution: SolvedViews, view: int, pixels: Floats, metres: float) -> float:

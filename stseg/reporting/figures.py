@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Boxes, Bytes, Labels, Observation, Rows
 from stseg.geometry import Rig
 from stseg.reporting.charts import clock_time
-from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, place_labels, text
+from stseg.reporting.pictures.canvas import blank, chips, disc, fading_stroke, text
 from stseg.reporting.pictures.colours import NIGHT, PAPER, QUIET, Picture, track_colour
 from stseg.reporting.pictures.overlay import OverlayView, overlay
 from stseg.reporting.pictures.plan import ground_sheet, plan_map, plan_view
@@ -183,11 +183,8 @@ class RunFilm:
             fading_stroke(canvas, plan.pixel(np.stack([path["x"], path["y"]], -1)), colour, 3, opacity)
             disc(canvas, place, 8, PAPER)
             disc(canvas, place, 6.5, colour)
-        words = [str(int(row["id"])) for row in present]
-        sizes = [chip_size(word, 13) for word in words]
-        centres = place_labels(places, sizes, (*plan.corner, *plan.far_corner), 14)
-        for row, word, (u, v) in zip(present, words, centres.tolist(), strict=True):
-            chip(canvas, word, (u, v), track_colour(int(row["id"])), 13)
+        ids = present["id"].tolist()
+        chips(canvas, places, [*map(str, ids)], map(track_colour, ids), 13, (*plan.corner, *plan.far_corner), 14)
         clock = f"{clock_time(frame / self._rig.frame_rate)}, frame {frame}"
         text(canvas, clock, (plan.corner[0], plan.size[1] - 38), QUIET, 16, (0, 0.5))
         return canvas

@@ -86,16 +86,13 @@ def plan(
     InputError
         As `stseg.track`.
     """
-    workforce, chosen, recording = (
-        Workforce(workers),
-        None if frames is None else FrameRange(*frames),
-        recording_of(rig),
-    )
+    workforce, chosen = Workforce(workers), None if frames is None else FrameRange(*frames)
+    recording = recording_of(rig)
     resolved = with_body_of(recording, config_of(config))
     require_effect(resolved, tracker)
-    watch = _Clock()
+    begin = perf_counter()
     streams = index_streams(recording)
-    counting = watch.lap()
+    counting = perf_counter() - begin
     for note in streams.notes:
         reporter_of(progress).note(note)
     first, stop = resolve_frames(chosen, streams, recording)
@@ -111,23 +108,24 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
     tried = sum(len(range(part.first, part.stop)) for part in parts)
     with TemporaryDirectory() as name:
         folder = Path(name)
-        work.make(replace(parts[0], stop=min(parts[0].first + _READY, job.stop)), folder / "ready.h5", _silent)
-        tracking, learning, made, fused = 0.0, [], [], _Count()
+        work.make(replace(parts[0], stop=min(parts[0].first + _READY, job.stop)), folder / "ready.h5", lambda _: None)
+        tracking, learning, made, fused = 0.0, list[float](), list[FinishedSegment](), list[int]()
         for part in parts:
-            watch = _Clock()
+            begin = perf_counter()
             work.foregrounds(part)
-            learning.append(watch.lap())
-            made.append(FinishedSegment(part, work.make(part, folder / f"{part.index}.h5", fused)))
-            tracking += watch.lap()
-        watch = _Clock()
+            learned_at = perf_counter()
+            made.append(FinishedSegment(part, work.make(part, folder / f"{part.index}.h5", fused.append)))
+            learning.append(learned_at - begin)
+            tracking += perf_counter() - learned_at
+        begin = perf_counter()
         assemble(job, made, folder / "run.h5")
-        joining, size = watch.lap(), (folder / "run.h5").stat().st_size
+        joining, size = perf_counter() - begin, (folder / "run.h5").stat().st_size
     # A segment is processed until its last window is solved: much of a short part, and little of a long one.
-    excess = (fused.calls - tried) / len(parts)
+    excess = (len(fused) - tried) / len(parts)
     processed = sum(segment.stop - segment.lead + excess for segment in cuts)
     learned = -(-frames // round(job.config.segments.background_period * job.recording.rig.frame_rate))
     return Forecast(
-        frames, len(cuts), workers, counting, max(learning) * learned, tracking / fused.calls * processed,
+        frames, len(cuts), workers, counting, max(learning) * learned, tracking / len(fused) * processed,
         joining / tried * frames, round(size / tried * frames),
     )  # fmt: skip
 
@@ -138,29 +136,3 @@ def _parts(job: Job) -> list[Segment]:
     length = min(length, max(1, total // _PLACES))
     begins = [job.first + (total - length) * place // (_PLACES - 1) for place in range(_PLACES)]
     return [Segment(k, begin, begin, begin + length) for k, begin in enumerate(begins) if k == 0 or total > _PLACES]
-
-
-class _Clock:
-    """Seconds between laps."""
-
-    def __init__(self) -> None:
-        self._last = perf_counter()
-
-    def lap(self) -> float:
-        """Since the last lap."""
-        last, self._last = self._last, perf_counter()
-        return self._last - last
-
-
-class _Count:
-    """Number of calls, one for each frame that is fused."""
-
-    def __init__(self) -> None:
-        self.calls = 0
-
-    def __call__(self, _: int) -> None:
-        self.calls += 1
-
-
-def _silent(_: int) -> None:
-    """No progress."""

@@ -121,14 +121,15 @@ def write_report(
     overwrite: bool,
 ) -> list[Path]:
     """Write the page and its pictures, see `report`; the files that were written."""
-    true = None if truth is None else _during(run, read_tracks_csv(truth))
+    rows = None if truth is None else read_tracks_csv(truth)
+    true = None if rows is None else rows[np.isin(rows["frame"], run.frames)]
     instants = _read_instants(run, run.recording, _frames(run, frame), camera_images)
     contents = page_contents(run, true, instants, bool(frame), camera_images)
     write_page(output, report_page(contents), overwrite)
     if pictures is None:
         return [output]
     drawn = instants if frame else instants[len(instants) // 2 :][:1]
-    return [output, *_write_figures(pictures, [*contents.still, *_named(run.recording, run, drawn)], overwrite)]
+    return [output, *write_figures(pictures, [*contents.still, *_named(run.recording, run, drawn)], overwrite)]
 
 
 def film(
@@ -176,7 +177,7 @@ def write_pictures(
     """
     instants = _read_instants(run, recording, [frame], camera_images)
     ground = ground_figures(recording.rig, run.views, run.trajectory, truth, run.names)
-    return _write_figures(folder, [*ground, *_named(recording, run, instants)], True)
+    return write_figures(folder, [*ground, *_named(recording, run, instants)], True)
 
 
 def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
@@ -192,18 +193,13 @@ def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
     return sorted({numbers[index] for index in middles.tolist()})
 
 
-def _during(run: Run, truth: Rows) -> Rows:
-    """The truth of the run's frames."""
-    return truth[np.isin(truth["frame"], run.frames)]
-
-
 def _read_instants(run: Run, recording: Recording, frames: Sequence[int], camera_images: bool) -> list[Instant]:
     unseen = (None,) * len(recording.rig.cameras)
-    views = _read_views(recording, frames) if camera_images and frames else {}
+    views = read_views(recording, frames) if camera_images and frames else {}
     return [Instant(frame, *run.read_frame(frame), views.get(frame, unseen)) for frame in frames]
 
 
-def _read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[Observation, ...]]:
+def read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[Observation, ...]]:
     """Observations of these frames, which are in order, by frame."""
     with open_frames(recording.pictured(), frames[0], frames[-1] + 1) as frame_sets:
         return {frame_set.frame: frame_set.views for frame_set in frame_sets if frame_set.frame in frames}
@@ -219,7 +215,8 @@ def _named(recording: Recording, run: Run, instants: Sequence[Instant]) -> list[
     return figures
 
 
-def _write_figures(folder: Path, figures: Iterable[Figure], overwrite: bool) -> list[Path]:
+def write_figures(folder: Path, figures: Iterable[Figure], overwrite: bool) -> list[Path]:
+    """Write figures as PNG files; their paths."""
     make_folder(folder)
     paths = []
     for figure in figures:

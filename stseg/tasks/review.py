@@ -20,10 +20,10 @@ from stseg.identities.review.doubts import Doubt, find_doubts
 from stseg.identities.search.costs import CONTRADICTION
 from stseg.io.config_file import parse_config
 from stseg.io.outputs.whole_files import require_new, write_page
-from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run, read_run
 from stseg.reporting.page.review_page import Question, best_views, moment_picture, review_page
 from stseg.tasks.correction import answered_before, is_solved_again
+from stseg.tasks.report import read_views
 
 _AROUND = 10.0
 """Time before and after a decision in which identities are solved with it, and with the opposite one, seconds."""
@@ -107,9 +107,7 @@ def _moments(run: Run, doubt: Doubt) -> tuple[tuple[str, int], ...]:
 
 def _frames(run: Run, doubts: Sequence[Doubt]) -> Mapping[int, tuple[Observation, ...]]:
     """Observations of the frames of all questions."""
-    wanted = sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)})
-    with open_frames(run.recording.pictured(), wanted[0], wanted[-1] + 1) as frame_sets:
-        return {one.frame: one.views for one in frame_sets if one.frame in set(wanted)}
+    return read_views(run.recording, sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)}))
 
 
 def _question(run: Run, doubt: Doubt, views: Mapping[int, tuple[Observation, ...]]) -> Question:

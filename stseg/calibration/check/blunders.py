@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -120,8 +120,7 @@ def find_stream_delay(
     for view in range(len(tables)):
         others = [other for other in range(len(tables)) if other != view]
         located = locate(people, tables, others, min(2, len(others)))
-        relocated = replace(people, ground=located.ground, height=located.height)
-        misfit = np.array([_misfit(tables[view], view, boxes_by_frame, relocated, shift) for shift in shifts])
+        misfit = np.array([_misfit(tables[view], view, boxes_by_frame, located, shift) for shift in shifts])
         if not np.isfinite(misfit).all():
             continue
         best = int(misfit.argmin())

@@ -118,8 +118,9 @@ def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) ->
         widths = (boxes[:, 2] - boxes[:, 0])[None] / wide
         off = np.hypot(middle, top) / GATE
         fits = (off < 1) & (early < _OCCLUSION) & (early > -GATE) & (widths > _MIN_WIDTH) & (widths < _MAX_WIDTH)
-    inside = _inside(body, table.size)[:, None]
-    return np.where(fits & inside, off, np.inf)
+        # Head and sides are inside the image.
+        inside = (body[:, :2] > 0).all(axis=1) & (body[:, 2] < table.size[0] - 1) & (body[:, 1] < table.size[1] - 1)
+    return np.where(fits & inside[:, None], off, np.inf)
 
 
 def wholly_visible(table: BodyTable, ground: Floats, height: Floats) -> Flags:
@@ -127,12 +128,6 @@ def wholly_visible(table: BodyTable, ground: Floats, height: Floats) -> Flags:
     body = table.boxes_of(ground, height)
     with np.errstate(invalid="ignore"):
         return np.asarray((body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1))
-
-
-def _inside(body: Floats, size: tuple[int, int]) -> Flags:
-    """Whether head and sides are inside the image, bool (n,)."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray((body[:, 0] > 0) & (body[:, 2] < size[0] - 1) & (body[:, 1] > 0) & (body[:, 1] < size[1] - 1))
 
 
 def _candidates(rig: Rig, boxes: Sequence[Floats]) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ across the viewing ray, so that near and far views are comparable.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,18 +26,10 @@ _DIFFERENCE = 0.02
 """Step of the finite differences, metres."""
 
 
-@dataclass(frozen=True)
-class GroundEstimate:
-    """Ground points and heights estimated from some of the views."""
-
-    ground: Floats
-    """float64 (n, 2): metres; nan where too few views see the person."""
-    height: Floats
-    """float64 (n,): metres."""
-
-
-def locate(people: BoxCorrespondences, tables: Sequence[BodyTable], views: Sequence[int], least: int) -> GroundEstimate:
-    """Locate people from the given views, where at least `least` of them have a box of the person."""
+def locate(
+    people: BoxCorrespondences, tables: Sequence[BodyTable], views: Sequence[int], least: int
+) -> BoxCorrespondences:
+    """People located from the given views: ground and height are nan where fewer than `least` have a box of them."""
     ground, height = people.ground.copy(), np.clip(people.height, 1.4, 2.0)
     boxes = people.box[:, list(views)]
     chosen = [tables[view] for view in views]
@@ -63,7 +55,7 @@ def locate(people: BoxCorrespondences, tables: Sequence[BodyTable], views: Seque
         push[:, 2] += (height - BODY_HEIGHT) / _HEIGHT_SPREAD**2
         step = np.clip(-np.linalg.solve(normal, push[..., None])[..., 0], -0.5, 0.5)
         ground, height = ground + step[:, :2], np.clip(height + step[:, 2], 1.2, 2.2)
-    return GroundEstimate(np.where(enough[:, None], ground, np.nan), np.where(enough, height, np.nan))
+    return replace(people, ground=np.where(enough[:, None], ground, np.nan), height=np.where(enough, height, np.nan))
 
 
 def _edge_residuals(tables: Sequence[BodyTable], boxes: Floats, people: Floats) -> Floats:

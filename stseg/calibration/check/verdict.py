@@ -191,7 +191,8 @@ def judge(rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences) -> 
         for suspect in suspects:
             corrected = _corrected(people, tables[suspect.view], current[suspect.view])
             after = _all_raw_disagreements(rig, tables, corrected)
-            trials.append((_spread(after), suspect, corrected, after))
+            spread = float(np.sqrt(np.mean([one.off**2 for one in _judged(after)])))  # root mean square over the views
+            trials.append((spread, suspect, corrected, after))
         if not trials:
             break
         _, worst, people, current = min(trials, key=lambda trial: trial[0])
@@ -248,8 +249,3 @@ def _corrected(people: BoxCorrespondences, table: BodyTable, raw: _RawDisagreeme
 
 def _worst(raw: Sequence[_RawDisagreement | None]) -> float:
     return max((one.off for one in _judged(raw)), default=0.0)
-
-
-def _spread(raw: Sequence[_RawDisagreement | None]) -> float:
-    """Root mean square over the views."""
-    return float(np.sqrt(np.mean([one.off**2 for one in _judged(raw)])))

@@ -5,7 +5,7 @@ Points are float (n, 2), u to the right and v down, pixel centres at integers. A
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import cv2
 import numpy as np
@@ -79,12 +79,6 @@ def disc(canvas: Bytes, place: AnyArray, radius: float, colour: Colour) -> None:
     cv2.circle(canvas, (u, v), r, colour, cv2.FILLED, cv2.LINE_AA, _SHIFT)
 
 
-def ring(canvas: Bytes, place: AnyArray, radius: float, colour: Colour, width: int = 1) -> None:
-    """A circle's edge."""
-    (u, v), r = _fixed(place).tolist(), round(radius * 2**_SHIFT)
-    cv2.circle(canvas, (u, v), r, colour, width, cv2.LINE_AA, _SHIFT)
-
-
 def text_size(words: str, size: float, weight: int = 1) -> tuple[int, int]:
     """Width and height of a line of text with capitals `size` pixels tall."""
     (width, _), _ = cv2.getTextSize(words, _FONT, size / _CAPITALS, weight)
@@ -131,6 +125,21 @@ def chip(canvas: Bytes, words: str, centre: tuple[float, float], colour: Colour,
     outline(canvas, plate, PAPER, 3)
     fill(canvas, plate, colour)
     text(canvas, words, centre, PAPER, size, (0.5, 0.5), 2)
+
+
+def chips(
+    canvas: Bytes,
+    places: AnyArray,
+    words: Sequence[str],
+    colours: Iterable[Colour],
+    size: float,
+    bounds: tuple[float, float, float, float],
+    gap: float = 9.0,
+) -> None:
+    """A `chip` beside each place (n, 2); see `place_labels` for bounds and gap."""
+    centres = place_labels(places, [chip_size(one, size) for one in words], bounds, gap)
+    for one, (u, v), colour in zip(words, centres.tolist(), colours, strict=True):
+        chip(canvas, one, (u, v), colour, size)
 
 
 def blend(part: Bytes, mask: Bytes, colour: Colour, opacity: float) -> None:

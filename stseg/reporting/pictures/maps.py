@@ -9,10 +9,10 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows
 from stseg.geometry import Grid, Rig
-from stseg.reporting.pictures.canvas import chip, chip_size, fill, outline, place_labels, stroke, text, text_size
+from stseg.reporting.pictures.canvas import chip, chips, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed
-from stseg.reporting.pictures.plan import border, draw_cameras
-from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
+from stseg.reporting.pictures.plan import draw_ground
+from stseg.reporting.pictures.plan_map import PlanMap, scale_bar, sheet
 
 _MAX_BINS = 40  # along the longer side of the ground, at most
 _BIN_SIDES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
@@ -137,7 +137,7 @@ def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks
     plan = map_of_maps(rig)
     canvas = sheet(plan, title)
     paint(canvas, plan, bins, warm_colours(values, limit))
-    _frame(canvas, plan, rig)
+    draw_ground(canvas, plan, rig)
     for letter, mark in zip("ABC", marks, strict=False):
         u, v = plan.pixel(np.array([mark.x, mark.y])).tolist()
         chip(canvas, letter, (u, v), INK, 16)
@@ -153,7 +153,7 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     most = max(len(rig.cameras), int(view_count.max()))
     tones = [_blind_tone(count, most) for count in range(most + 1)]
     paint(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[view_count])
-    _frame(canvas, plan, rig)
+    draw_ground(canvas, plan, rig)
     u, v = 76.0, plan.size[1] - 38.0
     wide = min(44.0, 460.0 / len(tones))
     for count, tone in enumerate(tones):
@@ -190,12 +190,6 @@ def _blind_tone(count: int, most: int) -> Colour:
     if count < 2:
         return ((60, 60, 190), (120, 190, 250))[count]
     return mixed((206, 199, 195), (252, 251, 250), (count - 1) / max(most - 1, 1))
-
-
-def _frame(canvas: Bytes, plan: PlanMap, rig: Rig) -> None:
-    rule(canvas, plan)
-    outline(canvas, plan.pixel(border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
-    draw_cameras(canvas, plan, rig.cameras)
 
 
 def _ramp(canvas: Bytes, plan: PlanMap, limit: float, units: str) -> None:
@@ -244,17 +238,11 @@ def flow_map(
     busy = field["density"] > 0.1 * max(float(field["density"].max(initial=0.0)), 1e-9)
     for row in field[busy]:
         _arrow(canvas, plan, row, side)
-    _name(canvas, plan, [*((name, rings[0], _ZONE) for name, rings in zones), *((*line, _LINE) for line in lines)])
+    named = [*((name, rings[0], _ZONE) for name, rings in zones), *((*line, _LINE) for line in lines)]
+    middles = np.array([plan.pixel(points.mean(axis=0)) for _, points, _ in named]).reshape(-1, 2)
+    bounds = (*plan.corner, *plan.far_corner)
+    chips(canvas, middles, [name for name, *_ in named], [colour for *_, colour in named], 11, bounds, 8)
     return canvas
-
-
-def _name(canvas: Bytes, plan: PlanMap, named: Sequence[tuple[str, Floats, Colour]]) -> None:
-    """Names beside the middles of zones and lines."""
-    places = np.array([plan.pixel(points.mean(axis=0)) for _, points, _ in named]).reshape(-1, 2)
-    sizes = [chip_size(name, 11) for name, *_ in named]
-    centres = place_labels(places, sizes, (*plan.corner, *plan.far_corner), 8)
-    for (name, _, colour), (u, v) in zip(named, centres.tolist(), strict=True):
-        chip(canvas, name, (u, v), colour, 11)
 
 
 def _arrow(canvas: Bytes, plan: PlanMap, row: np.void, side: float) -> None:

@@ -16,12 +16,11 @@ from stseg.geometry.rig import BODY_HEIGHT
 from stseg.reporting.pictures.canvas import (
     blank,
     chip,
-    chip_size,
+    chips,
     disc,
     fading_stroke,
     fill,
     outline,
-    place_labels,
     stroke,
     text,
 )
@@ -166,10 +165,8 @@ def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
     heads = view.pixel(np.stack([people["x"], people["y"]], -1), heights + 0.12)
     inside = np.isfinite(heads).all(axis=1) & (heads >= 0).all(axis=1) & (heads < view.size).all(axis=1)
     heads, people = heads[inside], people[inside]
-    words = [str(int(row["id"])) for row in people]
-    centres = place_labels(heads, [chip_size(word, 13) for word in words], (4, 4, view.size[0] - 4, view.size[1] - 4))
-    for row, word, (u, v) in zip(people, words, centres.tolist(), strict=True):
-        chip(canvas, word, (u, v), track_colour(int(row["id"])), 13)
+    ids, bounds = people["id"].tolist(), (4, 4, view.size[0] - 4, view.size[1] - 4)
+    chips(canvas, heads, [*map(str, ids)], map(track_colour, ids), 13, bounds)
 
 
 def _height(row: np.void) -> float:

@@ -11,13 +11,11 @@ import numpy as np
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
 from stseg.reporting.pictures.canvas import (
-    chip,
-    chip_size,
+    chips,
     dashes,
     disc,
     fill,
     outline,
-    place_labels,
     stroke,
     text,
     text_size,
@@ -76,10 +74,17 @@ def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) ->
     canvas = sheet(plan, title)
     if coverage is not None:
         _shade(canvas, plan, rig.grid, coverage)
-    rule(canvas, plan)
-    outline(canvas, plan.pixel(border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
-    draw_cameras(canvas, plan, rig.cameras)
+    draw_ground(canvas, plan, rig)
     return canvas
+
+
+def draw_ground(canvas: Bytes, plan: PlanMap, rig: Rig) -> None:
+    """Grid lines, the border of the area of interest, and cameras."""
+    (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
+    corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] if rig.grid.polygon is None else rig.grid.polygon
+    rule(canvas, plan)
+    outline(canvas, plan.pixel(np.asarray(corners, float)), mixed(INK, PAPER, 0.35), 2)
+    _draw_cameras(canvas, plan, rig.cameras)
 
 
 def plan_map(rig: Rig, width: int = 1400, height: int = 1500) -> PlanMap:
@@ -98,14 +103,6 @@ def _ground_position(camera: Camera, grid: Grid) -> Floats | None:
     return place if distance <= reach else None
 
 
-def border(grid: Grid) -> Floats:
-    """Corners of the area of interest, metres, float64 (n, 2)."""
-    if grid.polygon is not None:
-        return np.asarray(grid.polygon, float)
-    (x0, x1), (y0, y1) = grid.x, grid.y
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-
-
 def _shade(canvas: Bytes, plan: PlanMap, grid: Grid, coverage: Bytes) -> None:
     """Paint the cells; the area outside the rectangle stays paper."""
     most = max(int(coverage.max()), 1)
@@ -121,7 +118,7 @@ def _tone(count: int, most: int) -> Colour:
     return mixed(_UNSEEN_TONE, (252, 251, 250), count / most)
 
 
-def draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
+def _draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
     """Every camera, and its name behind it, below the names that are there already."""
     named: list[tuple[float, float, int]] = []
     for camera in cameras:
@@ -233,10 +230,8 @@ def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping
     size = 14.0 if len(paths) <= 12 else 11.0
     ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
     labels = [names.get(identity, str(identity)) for identity, _ in paths]
-    sizes = [chip_size(label, size) for label in labels]
-    centres = place_labels(ends, sizes, (*plan.corner, *plan.far_corner), 16)
-    for (identity, _), label, (u, v) in zip(paths, labels, centres.tolist(), strict=True):
-        chip(canvas, label, (u, v), track_colour(identity), size)
+    colours = [track_colour(identity) for identity, _ in paths]
+    chips(canvas, ends, labels, colours, size, (*plan.corner, *plan.far_corner), 16)
 
 
 def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:

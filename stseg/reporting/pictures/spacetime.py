@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Grid
-from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fill, outline, place_labels, stroke, text
+from stseg.reporting.pictures.canvas import blank, chips, disc, fill, outline, stroke, text
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Picture, mixed, track_colour
 from stseg.reporting.pictures.plan_map import step_for
 
@@ -186,7 +186,5 @@ def _label(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
     """Ids at the upper ends; of many threads only the longest."""
     longest = sorted(threads, key=lambda thread: -len(thread.places))[:_MAX_LABELS]
     ends = np.array([block.pixel(thread.places[-1]) for thread in longest]).reshape(-1, 2)
-    sizes = [chip_size(str(thread.identity), 14) for thread in longest]
-    tall, wide = canvas.shape[:2]
-    for thread, centre in zip(longest, place_labels(ends, sizes, (4, 4, wide - 4, tall - 4)).tolist(), strict=True):
-        chip(canvas, str(thread.identity), (centre[0], centre[1]), track_colour(thread.identity), 14)
+    ids, (tall, wide) = [thread.identity for thread in longest], canvas.shape[:2]
+    chips(canvas, ends, [*map(str, ids)], map(track_colour, ids), 14, (4, 4, wide - 4, tall - 4))

@@ -18,13 +18,14 @@ from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.recordings import recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
-from stseg.io.outputs.whole_files import make_folder, write_file, write_page
+from stseg.io.outputs.whole_files import write_page
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.reporting.figures import Figure, backdrop
-from stseg.reporting.page.html import STYLE, figures, note, png_bytes, section, table
+from stseg.reporting.page.html import STYLE, figures, note, section, table
 from stseg.reporting.pictures.maps import blind_map
 from stseg.reporting.pictures.overlay import grid_picture
+from stseg.tasks.report import write_figures
 
 DEFAULT_FRAMES = 300
 """Frames that are read by default."""
@@ -107,10 +108,7 @@ class RigCheck:
 
     def write_pictures(self, folder: Path, overwrite: bool = False) -> int:
         """Write the pictures as PNG files grid_CAMERA.png and coverage.png; their number."""
-        make_folder(folder)
-        for figure in self.pictures:
-            write_file(folder / f"{figure.name}.png", png_bytes(figure.picture), overwrite)
-        return len(self.pictures)
+        return len(write_figures(folder, self.pictures, overwrite))
 
 
 def check_rig(
