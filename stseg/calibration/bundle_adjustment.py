@@ -222,8 +222,7 @@ def _system(parameters: BundleParameters, problem: BundleProblem) -> _System:
         return np.where(np.isfinite(changed), changed, 0.0) * root
 
     by_view = np.stack(
-        [slope(of_view + h * _unit(k, SIZE), parameters.toe_offset, of_point, h) for k, h in enumerate(_STEP_SIZES)],
-        -1,
+        [slope(of_view + h * _unit(k, SIZE), parameters.toe_offset, of_point, h) for k, h in enumerate(_STEP_SIZES)], -1
     )
     by_toe = np.stack(
         [slope(of_view, parameters.toe_offset + 1e-4 * _unit(k, 2), of_point, 1e-4) for k in range(2)], -1

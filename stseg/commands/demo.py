@@ -18,12 +18,7 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.tasks.report import write_pictures
 
 
-def demo(
-    folder: Path = Path("stseg-demo"),
-    /,
-    *,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
-) -> None:
+def demo(folder: Path = Path("stseg-demo"), /, *, overwrite: Annotated[bool, Parameter(negative="")] = False) -> None:
     """Film a small simulated scene, track its people from the colour videos, score the tracks, write the report.
 
     Example: stseg demo

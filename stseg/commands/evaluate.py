@@ -108,26 +108,12 @@ def _table(scores: Scores) -> Table:
         place = f"x {x0:g} .. {x1:g}, y {y0:g} .. {y1:g} m"
     title = f"{scores.frames} frames, gate {scores.gate:g} m, {place}"
     table = Table(title=title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
-    table.add_row(
-        "found",
-        f"MODA {_percent(scores.moda)}",
-        f"precision {_percent(scores.precision)}",
-        f"recall {_percent(scores.recall)}",
-        f"MODP {_percent(scores.modp)}",
-    )
-    table.add_row(
-        "followed",
-        f"MOTA {_percent(scores.mota)}",
-        f"IDF1 {_percent(scores.idf1)}",
-        f"HOTA {_percent(scores.hota)}",
-        f"2 gates {_percent(scores.hota_2gate)}",
-    )
-    table.add_row(
-        "placed",
-        f"mean {_metres(scores.location_mean)}",
-        f"median {_metres(scores.location_median)}",
-        f"MOTP {_metres(scores.motp)}",
-    )
+    found = {"MODA": scores.moda, "precision": scores.precision, "recall": scores.recall, "MODP": scores.modp}
+    followed = {"MOTA": scores.mota, "IDF1": scores.idf1, "HOTA": scores.hota, "2 gates": scores.hota_2gate}
+    placed = {"mean": scores.location_mean, "median": scores.location_median, "MOTP": scores.motp}
+    table.add_row("found", *(f"{name} {_percent(value)}" for name, value in found.items()))
+    table.add_row("followed", *(f"{name} {_percent(value)}" for name, value in followed.items()))
+    table.add_row("placed", *(f"{name} {_metres(value)}" for name, value in placed.items()))
     table.add_row(
         f"people {scores.people}",
         f"MT {scores.mostly_tracked}",

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.terminal.progress import TerminalReporter
+from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording

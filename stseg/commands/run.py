@@ -84,7 +84,7 @@ def run(
     """
     if scheduler is None and not follow:
         prepare_workers(workers)  # they import the stages while this process does: nothing is imported before
-    from stseg.commands.terminal.progress import TerminalReporter
+    from stseg.commands.terminal.standard_error import TerminalReporter
     from stseg.engine.offline.frame_range import FrameRange
     from stseg.engine.track import track_recording
     from stseg.engine.workers.workforce import Workforce

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.terminal.progress import TerminalReporter
+from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.errors import ConfigError
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import abbreviated, parse_whole

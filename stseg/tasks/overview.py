@@ -64,6 +64,7 @@ def summarise_run(run: Run) -> Overview:
     people = np.unique(run.trajectory["frame"], return_counts=True)[1]
     ghosts, reasons = run.ghosts["status"] == 0, ghost_reasons(run.ghosts)
     solved = run.windows["solve_stop"] - run.windows["solve_first"]
+    kinds, counts = np.unique(run.events["kind"], return_counts=True)
     shares = ground_by_views(run.views, grid.inside(), len(run.cameras)).tolist()
     return Overview(
         file=str(run.path),
@@ -86,7 +87,7 @@ def summarise_run(run: Run) -> Overview:
         people_per_minute=people_per_minute(run.frames, run.trajectory, run.frame_rate).tolist(),
         tracks=_tracks(run),
         track_seconds=_track_seconds(run),
-        events=_counts(run.events["kind"]),
+        events={name.decode(): int(number) for name, number in zip(kinds.tolist(), counts, strict=True)},
         candidates_per_frame=per(len(ghosts), count),
         ghosts_per_frame=per(ghosts.sum(), count),
         ghost_reasons=dict(zip(REASONS, reasons.counts(), strict=True)),
@@ -129,11 +130,6 @@ def _track_seconds(run: Run) -> dict[str, float]:
     lengths = (run.tracks["last"] - run.tracks["first"] + 1) / run.frame_rate
     points = zip(("shortest", "median", "longest"), np.quantile(lengths, (0, 0.5, 1)).tolist(), strict=True)
     return dict(points)
-
-
-def _counts(kinds: np.ndarray[tuple[int, ...], np.dtype[np.bytes_]]) -> dict[str, int]:
-    names, counts = np.unique(kinds, return_counts=True)
-    return {name.decode(): int(number) for name, number in zip(names.tolist(), counts, strict=True)}
 
 
 def _warnings(run: Run, shares: list[float]) -> list[str]:

@@ -70,26 +70,20 @@ def label_images(
     found = run_of(run)
     if config is None:
         config = parse_config(found.provenance.config, f"{found.path}: the configuration", tuple(changes))
-    return _write_labels(found, config, Path(folder), frames_of_run(found, frames), reporter_of(progress), overwrite)
-
-
-def _write_labels(run: Run, config: Config, folder: Path, frames: Ints, reporter: Reporter, overwrite: bool) -> int:
-    """Write the label images of consecutive frames, int64 (n,), and count them."""
-    recording, cameras = run.recording, require_pixels(run.recording)
-    people = _people(run.trajectory, frames)
-    largest = int(run.trajectory["id"].max(initial=0))
-    images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, track_palette(), overwrite)
-    views = view_labels(recording.rig, config.labels, config.body)
-    colours = _appearances(run, views, people, frames, reporter)
-    foregrounds = make_foregrounds(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
+    chosen, reporter, cameras = frames_of_run(found, frames), reporter_of(progress), require_pixels(found.recording)
+    people, largest = _people(found.trajectory, chosen), int(found.trajectory["id"].max(initial=0))
+    images = LabelImages(Path(folder), [found.cameras[k] for k in cameras], largest, track_palette(), overwrite)
+    views = view_labels(found.recording.rig, config.labels, config.body)
+    colours = _appearances(found, views, people, chosen, reporter)
+    foregrounds = make_foregrounds(found.recording, config, int(found.frames[0]), int(found.frames[-1]) + 1)
     count = 0
-    for frame_set in _frame_sets(run, frames, config.foreground.chosen.memory, reporter):
+    for frame_set in _frame_sets(found, chosen, config.foreground.chosen.memory, reporter):
         for k in cameras:
             view = frame_set.views[k]
             pixels = foregrounds[k].pixels(view)
             if frame_set.frame in people:
                 ids = _ids(views[k], people[frame_set.frame], pixels, view, colours.get(k))
-                images.write(run.cameras[k], frame_set.frame, ids)
+                images.write(found.cameras[k], frame_set.frame, ids)
                 count += 1
     return count
 

@@ -190,7 +190,7 @@ def test_pyproject_lists_every_package() -> None:
 
 
 def test_a_run_imports_no_library_that_it_does_not_use() -> None:
-    imported = "stseg.commands.terminal.progress, stseg.engine.track, stseg.tasks.warnings"
+    imported = "stseg.commands.terminal.standard_error, stseg.engine.track, stseg.tasks.warnings"
     started = f"import {imported}, sys; print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", started], capture_output=True, text=True, check=True, env=ENVIRONMENT)
     assert not {"rich", "ssl", "scipy.optimize", "stseg.engine.live.following"} & set(found.stdout.split())

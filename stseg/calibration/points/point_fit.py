@@ -20,13 +20,7 @@ from stseg.calibration.points.known_intrinsics import fit_pinhole
 from stseg.calibration.points.point_requirements import require_ground, require_right_handed, require_upright
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera, Grid, Lens
-from stseg.geometry.fits import (
-    fit_homography,
-    fit_vertical,
-    focal_of_square_pixels,
-    middle_matrix,
-    vertical_of_matrix,
-)
+from stseg.geometry.fits import fit_homography, fit_vertical, focal_of_square_pixels, middle_matrix, vertical_of_matrix
 
 VerticalFrom = Literal["points", "lens", "square pixels"]
 """Source of the vertical."""

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from stseg.commands.calibrate.scene import numbers
-from stseg.commands.terminal.progress import TerminalReporter
+from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.geometry import Grid

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.commands.terminal.progress import TerminalReporter
+from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.outputs.whole_files import require_new
 from stseg.tasks.calibration.check import COLUMNS, RigCheck, check_rig

@@ -11,14 +11,12 @@ from cyclopts import Parameter
 from stseg.calibration.points.checkerboard import find_corners, fit_lens
 from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError
-from stseg.geometry import Camera
 from stseg.io.calibrations.xml_files import write_opencv_lens
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
-from stseg.io.recording.video.ffmpeg import read_video_size
+from stseg.tasks.calibration.automatic import uncalibrated_camera
 
-_UNIT_CAMERA = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _WORTH = 0.02
 """Mean movement of the corners that makes a view a new one, in image widths."""
 
@@ -61,8 +59,8 @@ def calibrate_lens(
         raise ConfigError(
             "--board, --every, --square", "", f"{board}, {every}, {square:g}", "3 or more; 1 or more; above 0"
         )
-    size = read_video_size(video)
-    stream = open_stream(Source("video", video), Camera.from_projection(video.stem, size, _UNIT_CAMERA))
+    camera = uncalibrated_camera(video.stem, video)
+    stream, size = open_stream(Source("video", video), camera), camera.size
     found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []
     try:
         while isinstance(view := stream.read(), np.ndarray):

@@ -11,17 +11,13 @@ from cyclopts import Parameter
 from stseg.arrays import Bytes
 from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError, SourceError
-from stseg.geometry import Camera
 from stseg.io.outputs.whole_files import require_new, write_page
 from stseg.io.recording.pictures import read_colour
 from stseg.io.recording.recording import Source
 from stseg.io.recording.source_files import is_image_source
 from stseg.io.recording.streams import open_stream
-from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.reporting.page.calibration_page import FloorPlan, calibration_page
-
-_UNIT_CAMERA = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
-"""A projection that stands for a camera's own until points are clicked."""
+from stseg.tasks.calibration.automatic import camera_names, uncalibrated_camera
 
 
 def calibrate_page(
@@ -55,9 +51,7 @@ def calibrate_page(
         Replace the page if it exists.
     """
     require_new(output, overwrite)
-    names = [path.stem for path in videos]
-    if len(set(names)) < len(names):
-        names = [path.absolute().parent.name for path in videos]
+    names = camera_names(videos)
     if not videos or len(set(names)) < len(names):
         raise ConfigError("calibrate page", "VIDEO", ", ".join(map(str, videos)), "one or more, with different names")
     x0, y0, x1, y1 = numbers("--area", area, "4 numbers x0,y0,x1,y1", 4)
@@ -72,8 +66,7 @@ def _frame(path: Path, number: int) -> Bytes:
     """A colour frame of a video, or a picture."""
     if is_image_source(path):
         return read_colour(path)
-    camera = Camera.from_projection(path.stem, read_video_size(path), _UNIT_CAMERA)
-    stream = open_stream(Source("video", path), camera)
+    stream = open_stream(Source("video", path), uncalibrated_camera(path.stem, path))
     try:
         view = stream.read() if stream.skip(number) == number else None
     finally:

@@ -74,26 +74,21 @@ class StreamOptions:
 
     def of(self, names: Sequence[str]) -> tuple[CameraSource, ...]:
         """The streams of these cameras."""
-        self._require_boxes()
-        if self.score is not None and not 0 <= self.score <= 1:
-            raise ConfigError("--score", "", repr(self.score), "a number of 0..1")
-        return tuple(
-            CameraSource(self._source_of(name, path), self._background_of(name))
-            for name, path in zip(names, self._paths(names), strict=True)
-        )
-
-    def _require_boxes(self) -> None:
-        """Refuse options of boxes beside other frames."""
         given = {"--first-frame": self.first_frame, "--score": self.score, "--appearance": self.appearance}
         for option, value in given.items():
             if value is not None and self.source_kind != "boxes":
                 raise ConfigError(option, "", f"--source-kind {self.source_kind}", "boxes")
+        if self.score is not None and not 0 <= self.score <= 1:
+            raise ConfigError("--score", "", repr(self.score), "a number of 0..1")
+        return tuple(self._source_of(name, path) for name, path in zip(names, self._paths(names), strict=True))
 
-    def _source_of(self, name: str, path: Path) -> Source:
+    def _source_of(self, name: str, path: Path) -> CameraSource:
         appearance = None if self.appearance is None else _filled(self.appearance, name)
-        return Source(
+        empty = None if self.background is None else Source(self.background_kind, _filled(self.background, name))
+        source = Source(
             self.source_kind, path, self.first_frame or 0, least_score=self.score or 0.0, appearance=appearance
         )
+        return CameraSource(source, empty)
 
     def _paths(self, names: Sequence[str]) -> list[Path]:
         if self.sources is not None and self.source_pattern is None:
@@ -103,9 +98,6 @@ class StreamOptions:
         if len(names) > 1 and "{name}" not in self.source_pattern:
             raise ConfigError("--source-pattern", "", repr(self.source_pattern), "a path with {name} in it")
         return [_filled(self.source_pattern, name) for name in names]
-
-    def _background_of(self, name: str) -> Source | None:
-        return None if self.background is None else Source(self.background_kind, _filled(self.background, name))
 
 
 def _filled(pattern: str, name: str) -> Path:

@@ -13,17 +13,7 @@ from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.bodies.pillars import PROFILE
 from stseg.geometry import Camera, Grid
 from stseg.geometry.rig import BODY_HEIGHT
-from stseg.reporting.pictures.canvas import (
-    blank,
-    chip,
-    chips,
-    disc,
-    fading_stroke,
-    fill,
-    outline,
-    stroke,
-    text,
-)
+from stseg.reporting.pictures.canvas import blank, chip, chips, disc, fading_stroke, fill, outline, stroke, text
 from stseg.reporting.pictures.colours import INK, NIGHT, PAPER, Colour, Picture, mixed, track_colour
 
 _SUBPIXELS = 4  # sub-pixels a pixel of a pillar's outline
@@ -41,13 +31,7 @@ _POLES = 4
 
 
 def overlay(
-    camera: Camera,
-    grid: Grid,
-    image: Bytes | None,
-    trajectory: Rows,
-    frame: int,
-    trail: int = 25,
-    width: int = 1280,
+    camera: Camera, grid: Grid, image: Bytes | None, trajectory: Rows, frame: int, trail: int = 25, width: int = 1280
 ) -> Picture:
     """Draw the people of a frame over a camera's image.
 

@@ -10,16 +10,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
-from stseg.reporting.pictures.canvas import (
-    chips,
-    dashes,
-    disc,
-    fill,
-    outline,
-    stroke,
-    text,
-    text_size,
-)
+from stseg.reporting.pictures.canvas import chips, dashes, disc, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed, track_colour
 from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 

@@ -157,14 +157,7 @@ _UMBRA = 0.75  # radius of full shadow
 
 
 @kernel
-def darken(
-    ground: Singles,
-    boxes: Ints,
-    centre: Floats,
-    form: Floats,
-    lamp: Floats,
-    shade: Singles,
-) -> None:
+def darken(ground: Singles, boxes: Ints, centre: Floats, form: Floats, lamp: Floats, shade: Singles) -> None:
     """Raise `shade`, 0..1, of every pixel's ground point to the shadow cast there.
 
     Parameters

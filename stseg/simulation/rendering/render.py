@@ -102,20 +102,9 @@ class Viewer:
         silhouettes = np.empty((len(crowd.id), 5), np.int64)
         paint = np.array([clothing(self._spec.seed, int(person), self._spec.alike) for person in crowd.id])
         if len(crowd.id):
-            draw_bodies(
-                self._rays,
-                self._eye,
-                pixel_boxes(self.camera, bodies.corners(1.0)),
-                bodies.centre,
-                bodies.form,
-                paint,
-                LAMP,
-                crowd.id.astype(np.uint16),
-                depth,
-                image,
-                instances,
-                silhouettes,
-            )
+            ids, boxes = crowd.id.astype(np.uint16), pixel_boxes(self.camera, bodies.corners(1.0))
+            scene = (self._rays, self._eye, boxes, bodies.centre, bodies.form, paint, LAMP)
+            draw_bodies(*scene, ids, depth, image, instances, silhouettes)
         return Drawing(image, instances, silhouettes, depth)
 
     def _with_shadows(self, bodies: Bodies) -> Bytes:

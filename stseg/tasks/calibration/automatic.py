@@ -38,8 +38,7 @@ from stseg.io.recording.video.ffmpeg import read_video_size
 
 Distance = tuple[str, float, float, float, float, float]
 """A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""
-UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
-"""Projection of a camera that is read before it is calibrated."""
+_UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
 
@@ -141,7 +140,10 @@ def calibrate_auto(
     if backgrounds:
         solution, floor_marks = sharpen_by_floor(views, solution, backgrounds)
     if stated_distance is not None:
-        solution = scaled(solution, _scale(distance_factor(solution, *stated_distance)))
+        factor = distance_factor(solution, *stated_distance)
+        if not np.isfinite(factor):
+            raise ConfigError("--distance", "", "a pixel above the horizon", "pixels that show the ground")
+        solution = scaled(solution, factor)
     recording = _recording(output, streams, solution, cell)
     write_rig(output, recording)
     points = solution.adjustment.parameters.points
@@ -156,6 +158,11 @@ def camera_names(videos: Sequence[Path]) -> list[str]:
     return [path.absolute().parent.name for path in videos] if len(set(names)) < len(names) else names
 
 
+def uncalibrated_camera(name: str, video: Path) -> Camera:
+    """A placeholder for the camera of a video that is read before it is calibrated."""
+    return Camera.from_projection(name, read_video_size(video), _UNCALIBRATED)
+
+
 def _streams(
     videos: Sequence[Path], output: Path, frame_rate: float, background: str | None, kind: Literal["video", "masks"]
 ) -> Recording:
@@ -165,10 +172,7 @@ def _streams(
         raise ConfigError("calibrate auto", "VIDEO", ", ".join(map(str, videos)), "two or more, with different names")
     if not frame_rate > 0:
         raise ConfigError("--frame-rate", "", frame_rate, "frames per second, above 0")
-    cameras = tuple(
-        Camera.from_projection(name, read_video_size(path), UNCALIBRATED)
-        for name, path in zip(names, videos, strict=True)
-    )
+    cameras = tuple(uncalibrated_camera(name, path) for name, path in zip(names, videos, strict=True))
     sources = tuple(
         CameraSource(
             Source(kind, path),
@@ -189,12 +193,6 @@ def _known_distance(distance: Distance, names: Sequence[str]) -> tuple[int, Floa
     if not metres > 0 or pixels[:2] == pixels[2:]:
         raise ConfigError("--distance", "", found, "two different pixels, and metres above 0")
     return list(names).index(camera), np.array(pixels, float).reshape(2, 2), metres
-
-
-def _scale(factor: float) -> float:
-    if not np.isfinite(factor):
-        raise ConfigError("--distance", "", "a pixel above the horizon", "pixels that show the ground")
-    return factor
 
 
 def _frame_range(frames: tuple[int | None, int | None] | None, length: int) -> tuple[int, int]:

@@ -14,8 +14,8 @@ from stseg.calibration.points.point_fit import PointFit, Points, fit_points
 from stseg.calibration.points.point_requirements import require_height
 from stseg.engine.recordings import AnySource, camera_source
 from stseg.errors import ConfigError
-from stseg.geometry import Grid, Lens, Rig
-from stseg.io.calibrations.point_files import PointTable, read_points
+from stseg.geometry import Grid, Rig
+from stseg.io.calibrations.point_files import read_points
 from stseg.io.calibrations.world_frame import UNITS
 from stseg.io.calibrations.xml_files import read_opencv_lens
 from stseg.io.outputs.whole_files import require_new
@@ -96,7 +96,11 @@ def calibrate_points(
     require_new(output, overwrite)
     tables, fits = read_points(Path(points)), list[PointFit]()
     for table in tables:
-        fits.append(_fit(table, size, unit, None if lens is None else _lens(lens, table.camera)))
+        if lens is not None and "{name}" not in lens:
+            raise ConfigError("--lens", "", repr(lens), "a path with {name} in it")
+        known_lens = None if lens is None else read_opencv_lens(Path(lens.replace("{name}", table.camera)))
+        metres = table.place * UNITS[unit]
+        fits.append(fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), known_lens))
         require_height(fits[-1].camera, unit, UNITS)
     names = [table.camera for table in tables]
     rig = Rig(scene or output.stem, frame_rate, grid, tuple(fit.camera for fit in fits))
@@ -134,14 +138,3 @@ def fit_warnings(fit: PointFit, grid: Grid) -> list[str]:
     if int(fit.points.low.sum()) == 4:
         words.append(f"{fit.camera.name}: four points fit any camera: a fifth would show whether they are right")
     return words
-
-
-def _fit(table: PointTable, size: tuple[int, int], unit: str, lens: Lens | None) -> PointFit:
-    metres = table.place * UNITS[unit]
-    return fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), lens)
-
-
-def _lens(pattern: str, name: str) -> Lens:
-    if "{name}" not in pattern:
-        raise ConfigError("--lens", "", repr(pattern), "a path with {name} in it")
-    return read_opencv_lens(Path(pattern.replace("{name}", name)))
