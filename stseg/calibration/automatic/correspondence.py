@@ -40,9 +40,9 @@ class Correspondences:
         number = np.full(len(self.frame), -1, np.int64)
         number[points] = np.arange(len(points))
         kept = number[self.point] >= 0
-        of_points = (one[points] for one in (self.frame, self.ground, self.velocity, self.person))
         ends = (self.foot[kept], self.head[kept])
-        return Correspondences(*of_points, number[self.point[kept]], self.view[kept], *ends)
+        places = (self.frame[points], self.ground[points], self.velocity[points], self.person[points])
+        return Correspondences(*places, number[self.point[kept]], self.view[kept], *ends)
 
 
 def match_endpoints(
