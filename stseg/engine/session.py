@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from typing import NamedTuple
 
 import numpy as np
 
@@ -158,11 +157,8 @@ class Session:
         return self.pipeline.occupancy.fuse(evidence, explanation, rates, noise).dense()
 
 
-class _Prepared(NamedTuple):
-    """A frame set and its evidence."""
-
-    frame_set: FrameSet
-    evidence: list[ViewEvidence]
+_Prepared = tuple[FrameSet, list[ViewEvidence]]
+"""A frame set and its evidence."""
 
 
 def two_cores() -> int:
@@ -204,7 +200,7 @@ def _next_prepared(session: Session, coming: Iterator[FrameSet]) -> _Prepared | 
     """The next frame set with its evidence; None after the last."""
     with session.watch.time("read"):
         frame_set = next(coming, None)
-    return None if frame_set is None else _Prepared(frame_set, session.evidence(frame_set))
+    return None if frame_set is None else (frame_set, session.evidence(frame_set))
 
 
 def _prepared(

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from stseg.arrays import Bytes, Flags, Ints, Labels
 from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.lattice import Lattice, neighbour, nodes_of
+from stseg.graphcut.qpbo import connected
 from stseg.graphcut.sign_sets import GUARD
 from stseg.kernels.accelerate import kernel
 
@@ -41,9 +40,7 @@ class CellSubset:
 
     def components(self) -> Ints:
         """Connected component of each cell, from 0, int64 (n,)."""
-        size = len(self.cell)
-        graph = csr_array((np.ones(len(self.start), bool), (self.start, self.end)), shape=(size, size))
-        return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+        return connected(self.start, self.end, len(self.cell))
 
     def only(self, kept: Flags) -> CellSubset:
         """Some whole components; kept bool (n,)."""

@@ -107,13 +107,7 @@ def prune_unchanged(cells: Ints, adjacency: Neighbours, changed: Ints, since: in
 
 @kernel
 def prune_unprofitable(
-    alpha: int,
-    cells: Ints,
-    labels: Ints,
-    adjacency: Neighbours,
-    node: Ints,
-    gain: Ints,
-    stack: Ints,
+    alpha: int, cells: Ints, labels: Ints, adjacency: Neighbours, node: Ints, gain: Ints, stack: Ints
 ) -> None:
     """Set node to -1 for nodes that gain nothing by alpha even if all other nodes take it.
 
@@ -160,15 +154,7 @@ def prune_unprofitable(
 
 
 @kernel
-def fill_move(
-    alpha: int,
-    cells: Ints,
-    labels: Ints,
-    adjacency: Neighbours,
-    node: Ints,
-    unary: Ints,
-    arcs: Arcs,
-) -> int:
+def fill_move(alpha: int, cells: Ints, labels: Ints, adjacency: Neighbours, node: Ints, unary: Ints, arcs: Arcs) -> int:
     """Fill the binary energy of a move; number of its edges.
 
     With x = 1 where a node takes alpha, an edge costs w for x_p != x_q, 0 for x_p = x_q = 1 and w [l_p != l_q] for

@@ -186,13 +186,7 @@ def _search(graph: Graph, trees: Trees, queue: Queue) -> None:
 @part
 def _grow(graph: Graph, trees: Trees, queue: Queue, node: int) -> tuple[int, int]:
     """Grow a node's tree by its free neighbours; where the trees touch, the source-side node and arc, else -1, -1."""
-    residual, parent, tree, timestamp, distance = (
-        graph.residual,
-        trees.parent,
-        trees.tree,
-        trees.timestamp,
-        trees.distance,
-    )
+    residual, (parent, tree, timestamp, distance, _) = graph.residual, trees
     mine = tree[node]
     for arc in range(graph.first[node], graph.first[node + 1]):
         if mine == SOURCE and residual[arc] == 0:
@@ -281,13 +275,7 @@ def _adopt(graph: Graph, trees: Trees, queue: Queue) -> None:
 @part
 def _find_parent(graph: Graph, trees: Trees, node: int, time: int) -> tuple[int, int]:
     """Arc to the neighbour with the shortest path to the terminal, and the length of that path."""
-    residual, parent, tree, timestamp, distance = (
-        graph.residual,
-        trees.parent,
-        trees.tree,
-        trees.timestamp,
-        trees.distance,
-    )
+    residual, (parent, tree, timestamp, distance, _) = graph.residual, trees
     mine = tree[node]
     best, least = NO_ARC, _UNBOUNDED
     for arc in range(graph.first[node], graph.first[node + 1]):

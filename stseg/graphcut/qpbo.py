@@ -109,10 +109,14 @@ def _components(energy: QuadraticEnergy, open_: Flags) -> list[Ints]:
     if not open_.any():
         return []
     inner = open_[energy.start] & open_[energy.end] & (energy.weight != 0)
-    size = len(open_)
-    graph = csr_array((np.ones(int(inner.sum()), bool), (energy.start[inner], energy.end[inner])), shape=(size, size))
-    piece = connected_components(graph, directed=False)[1]
+    piece = connected(energy.start[inner], energy.end[inner], len(open_))
     return [np.flatnonzero((piece == k) & open_) for k in np.unique(piece[open_])]
+
+
+def connected(start: Ints, end: Ints, size: int) -> Ints:
+    """Connected component of each of some nodes by edges between them, from 0, int64 (size,)."""
+    graph = csr_array((np.ones(len(start), bool), (start, end)), shape=(size, size))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def _enumerate(energy: QuadraticEnergy, labels: Flags, nodes: Ints) -> None:

@@ -57,11 +57,8 @@ def _fill_sets(unary: Labels, present: Flags, most: int, state: Bytes, margin: L
         for p in range(planes):
             for y in range(rows):
                 first = ((t * (planes + 1) + p + 1) * (rows + 1) + y + 1) * (columns + 1) + 1
-                gain, side, slack = (
-                    unary[t, p, y],
-                    state[first : first + columns],
-                    margin[first : first + columns],
-                )
+                gain, row = unary[t, p, y], slice(first, first + columns)
+                side, slack = state[row], margin[row]
                 for x in range(columns):
                     side[x] = (LABEL_ONE if gain[x] > 0 else LABEL_ZERO) if present[y, x] else GUARD
                     slack[x] = gain[x] - 1 if gain[x] > 0 else -gain[x]

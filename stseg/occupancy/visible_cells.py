@@ -51,23 +51,6 @@ class PixelAssignment(NamedTuple):
     separate: Flags
 
 
-@kernel
-def fill_occupied(raster: NDArray[np.int16], occupied: Labels) -> None:
-    """Fill occupied (v + 1, u + 1); see `PixelAssignment`."""
-    row = np.empty(raster.shape[1], np.int32)
-    occupied[0] = 0
-    for v in range(raster.shape[0]):
-        most, here = np.int16(-1), np.int32(0)
-        for u in range(len(row)):
-            most = max(most, raster[v, u])
-        for u in range(len(row) if most >= 0 else 0):
-            here += np.int32(raster[v, u] >= 0)
-            row[u] = here
-        occupied[v + 1, 0] = 0
-        for u in range(len(row)):
-            occupied[v + 1, u + 1] = occupied[v, u + 1] + (row[u] if most >= 0 else 0)
-
-
 @part
 def _overlap(first: int, extent: int, step: int, k: int) -> int:
     """Number of the pixels first..first + extent - 1 in raster pixel k."""

@@ -24,7 +24,7 @@ from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_per
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 from stseg.occupancy.revision import NEAR_PRIOR, prior_log_odds
 from stseg.occupancy.shown_cells import CellTables, ShownCells, blocks_of, mark_map
-from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
+from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_share, mark_people
 from stseg.records.people import Explanation
 from stseg.records.sparse_volume import SparseVolume
 
@@ -241,8 +241,8 @@ class Occupancy:
         camera, step, raster = self.rig.cameras[i], explanation.raster_step[i], explanation.pixel_assignment[i]
         width, height = camera.size
         distance = np.hypot(*(people.ground - camera.centre[:2]).T)
-        occupied = np.empty((raster.shape[0] + 1, raster.shape[1] + 1), np.int32)
-        fill_occupied(raster, occupied)
+        occupied = np.zeros((raster.shape[0] + 1, raster.shape[1] + 1), np.int32)
+        np.cumsum((raster >= 0).cumsum(0, dtype=np.int32), 1, out=occupied[1:, 1:])
         return PixelAssignment(
             raster, occupied, step, _raster_lines(height, step), _raster_lines(width, step), distance, separate
         )

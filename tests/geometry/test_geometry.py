@@ -19,8 +19,8 @@ from stseg.commands.main import main
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.grid import inside_polygon
-from stseg.geometry.projection import LensTerms, pixel_of
 from stseg.geometry.rig import greatest_reduction
+from stseg.geometry.sampling import LensTerms, pixel_of
 from stseg.io.recording.frames import open_frames, read_background
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import read_recording

@@ -7,8 +7,9 @@ each frame is read once, and no frame is stored.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from statistics import median
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -16,10 +17,13 @@ import numpy as np
 from stseg.arrays import Rows
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.live.live_foreground import LiveForegrounds
-from stseg.engine.live.open_segment import OpenSegment
 from stseg.engine.offline.assembly import FinishedSegment
 from stseg.engine.offline.job import Job
+from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
+from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import Session
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.live.live_stream import now
 from stseg.io.live.live_tables import CorrectionTable, LiveTable
 from stseg.io.live.publishing import Publisher
@@ -29,7 +33,7 @@ from stseg.records.border import Border
 from stseg.records.tables import TRAJECTORY
 from stseg.trackers import find_tracker
 from stseg.tracking.windows.windows import window_length
-from stseg.trajectories.live_ids import LiveCorrections, LiveIds, renamed
+from stseg.trajectories.live_ids import LiveCorrections, LiveIds, Names, renamed
 from stseg.view_health.blind_views import BlindViews
 
 
@@ -87,10 +91,8 @@ class LiveRun:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is not None:
+    def __exit__(self, *reason: object) -> None:
+        if any(reason):
             self._discard()
 
     @property
@@ -123,7 +125,7 @@ class LiveRun:
             self._open(self._coming)
             self._coming = next(self._plan, None)
         for opened in self._opened:
-            self._take(opened, opened.add(frame_set), opened.segment.stop)
+            self._take(opened, opened.session.add(frame_set), opened.segment.stop)
         if self._opened:
             oldest = self._opened[0]
             if oldest.complete and frame_set.frame >= oldest.segment.stop + self._window:
@@ -132,7 +134,7 @@ class LiveRun:
     def finish(self) -> list[FinishedSegment]:
         """Close the run after its last frame set; all finished segments."""
         if self._opened and self._opened[0].segment.first < self._stop:
-            self._take(self._opened[0], self._opened[0].finish(), self._stop)
+            self._take(self._opened[0], self._opened[0].session.finish(), self._stop)
             self._keep(self._stop)
         self._discard()
         return self.finished
@@ -193,3 +195,64 @@ class LiveRun:
         for opened in self._opened:
             opened.close()
         self._opened = []
+
+
+class OpenSegment:
+    """A segment in progress and its unfinished file, which `keep` completes and `close` discards.
+
+    Parameters
+    ----------
+    job, segment
+        The job, and the segment; the last segment of a run may end earlier or later than planned.
+    pipeline
+        The stages.
+    foregrounds
+        Foreground model of each camera, owned by this segment.
+    draft
+        Path of the unfinished file.
+
+    Attributes
+    ----------
+    session
+        The stages, by which its frame sets are processed.
+    warm_up : list of TRAJECTORY (n,)
+        Rows of the warm-up.
+    names
+        The run's ids of the segment's tracks; None during the warm-up.
+    """
+
+    def __init__(
+        self, job: Job, segment: Segment, pipeline: Pipeline, foregrounds: list[ViewForeground], draft: Path
+    ) -> None:
+        self.segment, self.warm_up = segment, list[Rows]()
+        self.names: Names | None = None
+        self.session = Session(pipeline, foregrounds, segment.lead, job.read.factors)
+        self._writer = SegmentWriter(job, segment, pipeline.occupancy.views, draft)
+        self._beyond: list[tuple[CommittedFrames, Rows]] = []
+        """Steps beyond the planned end; part of this segment only if it is the last of the run."""
+        self._committed = segment.lead
+
+    @property
+    def complete(self) -> bool:
+        """Whether all frames of the segment are committed."""
+        return self._committed >= self.segment.stop
+
+    def close(self) -> None:
+        """Close the writer; a file that was not kept is discarded."""
+        self._writer.close()
+
+    def write(self, step: CommittedFrames, events: Rows) -> None:
+        """Append a step of the session to the file, with further EVENT rows of its frames."""
+        self._committed = step.commit.frames[-1].frame + 1
+        if self._committed > self.segment.stop:
+            self._beyond.append((step, events))
+        else:
+            self._writer.write(step, events)
+
+    def keep(self, stop: int) -> tuple[Segment, Path]:
+        """The segment with its final end before frame `stop`, and the path of its finished file."""
+        self.segment = self._writer.segment = replace(self.segment, stop=stop)
+        for step, events in self._beyond:
+            if step.commit.frames[0].frame < stop:
+                self._writer.write(step, events)
+        return self.segment, self._writer.keep()

@@ -37,31 +37,6 @@ class FinishedSegment(NamedTuple):
     path: Path
 
 
-class _SegmentRows(NamedTuple):
-    """A segment's file, its committed rows, and the run's track id of each row, 0 for none."""
-
-    run: Run
-    rows: Rows
-    identity: Ints
-
-
-class _Association(NamedTuple):
-    """The tracks of a run.
-
-    Attributes
-    ----------
-    joined
-        The tracks of all segments under names of the run.
-    tracks
-    identity : int64 (n,)
-        The track id of each of the joined rows, 0 for none.
-    """
-
-    joined: StitchedTracks
-    tracks: Tracks
-    identity: Ints
-
-
 def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: Caller = called_here) -> Tracks:
     """Write the run file of a job from its finished segments.
 
@@ -93,8 +68,8 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
             _copy(read_run(path), writer)
         joined, tracks, identity = association()
         with ThreadPoolExecutor(os.cpu_count()) as packers:
-            for part in _segment_rows(finished, joined, identity):
-                _append_labels(part, writer, packers)
+            for run, rows, ids in _segment_rows(finished, joined, identity):
+                _append_labels(run, rows, ids, writer, packers)
         writer.append("trajectory", tracks.trajectory)
         if not find_tracker(job.tracker).final:
             writer.append("committed", joined.committed)
@@ -106,8 +81,8 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
     return tracks
 
 
-def _associated(job: Job, finished: Sequence[FinishedSegment]) -> _Association:
-    """The tracks of a run from those of its segments."""
+def _associated(job: Job, finished: Sequence[FinishedSegment]) -> tuple[StitchedTracks, Tracks, Ints]:
+    """Tracks of all segments under names of the run, tracks of the run, and the id of each joined row, 0 for none."""
     stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = finished[0].segment.first if finished else 0
     appearance = [np.zeros(0, APPEARANCE)]
@@ -121,7 +96,7 @@ def _associated(job: Job, finished: Sequence[FinishedSegment]) -> _Association:
         job.read.reduced_rig, job.config, find_tracker(job.tracker), joined.committed, joined.events,
         np.concatenate(appearance), job.recording.rig, job.known,
     )  # fmt: skip
-    return _Association(joined, tracks, identity)
+    return joined, tracks, identity
 
 
 def _copy(run: Run, writer: RunWriter) -> None:
@@ -134,31 +109,31 @@ def _copy(run: Run, writer: RunWriter) -> None:
 
 def _segment_rows(
     finished: Sequence[FinishedSegment], joined: StitchedTracks, identity: Ints
-) -> Iterator[_SegmentRows]:
-    """Divide the committed rows and their ids, which are in the order of the segments, among the segments."""
+) -> Iterator[tuple[Run, Rows, Ints]]:
+    """The file of each segment in their order, its committed rows, and the run's track id of each row, 0 for none."""
     first = 0
     for segment, path in finished:
         run = read_run(path)
         stop = first + int((run.trajectory["frame"] >= segment.first).sum())
         rows = joined.committed[first:stop].copy()
         rows["id"] = joined.local[first:stop]
-        yield _SegmentRows(run, rows, identity[first:stop])
+        yield run, rows, identity[first:stop]
         first = stop
 
 
-def _append_labels(part: _SegmentRows, writer: RunWriter, packers: Executor) -> None:
+def _append_labels(run: Run, rows: Rows, identity: Ints, writer: RunWriter, packers: Executor) -> None:
     """Append a segment's labels, with the run's track ids, to the run file.
 
     Frames whose tracks keep their ids are copied as they are packed; the others are renamed side by side.
     """
-    order = np.argsort(part.rows["frame"], kind="stable")
-    rows, identity = part.rows[order], part.identity[order]
+    order = np.argsort(rows["frame"], kind="stable")
+    rows, identity = rows[order], identity[order]
 
     def renamed(frame: int, label: PackedFrame) -> PackedFrame:
         of_frame = slice(*rows["frame"].searchsorted([frame, frame + 1]))
-        return _renamed(label, part.run.views.shape, rows[of_frame], identity[of_frame])
+        return _renamed(label, run.views.shape, rows[of_frame], identity[of_frame])
 
-    for frames, label in part.run.read_packed_frames(layout.LABEL, _BLOCK):
+    for frames, label in run.read_packed_frames(layout.LABEL, _BLOCK):
         writer.append_packed_labels(list(packers.map(renamed, frames.tolist(), label)))
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import Executor, Future
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +50,7 @@ class _Step(NamedTuple):
     events: Rows
 
 
-class SegmentWriter(AbstractContextManager["SegmentWriter"]):
+class SegmentWriter(ExitStack):
     """Writes the file of a segment; one that `keep` has not completed is discarded on exit.
 
     Of the warm-up the file has the trajectory alone: by it the segment's tracks are associated with those of the
@@ -68,18 +67,13 @@ class SegmentWriter(AbstractContextManager["SegmentWriter"]):
     """
 
     def __init__(self, job: Job, segment: Segment, views: Bytes, draft: Path) -> None:
+        super().__init__()
         self.segment = segment
         self._job, self._draft = job, draft
         self._steps = deque[_Step]()
-        self._opened = ExitStack()
-        self._writer = self._opened.enter_context(
+        self._writer = self.enter_context(
             RunWriter(draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume)
         )
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._opened.close()
 
     def write(self, step: CommittedFrames, events: Rows | None = None, executor: Executor | None = None) -> None:
         """Append committed frames; the last step may be packed until the next is written.
@@ -111,7 +105,7 @@ class SegmentWriter(AbstractContextManager["SegmentWriter"]):
         while self._steps:
             self._append(self._steps.popleft())
         self._writer.finish(np.zeros(0, TRACK))
-        self._opened.close()
+        self.close()
         return keep_segment(self._draft)
 
     def _append(self, step: _Step) -> None:

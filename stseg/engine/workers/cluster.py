@@ -58,13 +58,12 @@ def make_by_cluster(
             "--scheduler", "", f"no scheduler at {address} ({error})", "its address, tcp://HOST:PORT"
         ) from error
     with client:
+        name = job.recording.rig.name  # the dashboard shows the part of a key before the first dash as the stage
         shared = client.scatter(pickle.dumps(job), broadcast=True)
-        futures = {
-            client.submit(
-                make_segment, shared, segment, draft(segment.index).absolute(), key=_key(job, segment), pure=False,
-            ): segment
-            for segment in missing
-        }  # fmt: skip
+        futures = {}
+        for segment in missing:
+            path, key = draft(segment.index).absolute(), f"segment-{name}-{segment.index:05}"
+            futures[client.submit(make_segment, shared, segment, path, key=key, pure=False)] = segment
         for future in as_completed(futures):
             segment = futures.pop(future)  # released: its file exists, so it is not recomputed if its worker dies
             try:
@@ -85,8 +84,3 @@ def make_segment(job: bytes, segment: Segment, draft: Path) -> Path:
 def _worker(job: bytes) -> SegmentWorker:
     """The worker of a job, kept between its segments."""
     return SegmentWorker(pickle.loads(job))
-
-
-def _key(job: Job, segment: Segment) -> str:
-    """Key of a segment's task; the scheduler's dashboard shows the part before the first dash as the stage."""
-    return f"segment-{job.recording.rig.name}-{segment.index:05}"
