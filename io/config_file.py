@@ -129,21 +129,11 @@ GivenTree = Mapping[str, "Given | GivenTree"]
 
 
 def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
-    """Settings of this kind: what is given, and defaults for the rest.
+    """Settings of a kind, a dataclass: what is given, by names and tables of them, and defaults for the rest.
 
-    ConfigError where a name is unknown, a value of another type, or out of the range that the dataclass itself holds
-    to.
-
-    Parameters
-    ----------
-    kind
-        The dataclass.
-    given
-        Values by name, and tables of them.
-    place
-        What to name where a fault lies in no single value.
-    table
-        Full name of the table that the settings stand in; empty at the top.
+    `place` is named where a fault lies in no single value; `table` is the full name of the table that the settings
+    stand in, empty at the top. ConfigError where a name is unknown, a value of another type, or out of the range that
+    the dataclass itself holds to.
     """
     hints = get_type_hints(kind)
     values = {}

@@ -70,21 +70,11 @@ def camera_from_pose(
     translation: Floats,
     distortion: Floats,
 ) -> ForeignCamera:
-    """A camera P = K [R | t], with its lens unless the distortion is zero.
+    """A camera P = K [R | t], with its lens unless the distortion is zero; file, name and size as in `ForeignCamera`.
 
-    FormatError where these are no camera matrix, no rotation, or too many coefficients; CalibrationError where R is a
-    mirror.
-
-    Parameters
-    ----------
-    file, name, size
-        As in `ForeignCamera`.
-    matrix, rotation : float64 (3, 3)
-        K, pixels, and R.
-    translation : float64 (3,)
-        t, lengths of the foreign world.
-    distortion : float64 (n,)
-        OpenCV's coefficients; those beyond the first eight must be zero.
+    K, pixels, and R are float64 (3, 3), t float64 (3,) in lengths of the foreign world. The distortion is float64
+    (n,), OpenCV's coefficients; those beyond the first eight must be zero. FormatError where these are no camera
+    matrix, no rotation, or too many coefficients; CalibrationError where R is a mirror.
     """
     key = f"camera {name}" if name else "camera"
     if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:

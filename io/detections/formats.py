@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,26 +15,17 @@ from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.values import printable
 
-
-@dataclass(frozen=True, slots=True)
-class JsonFormat:
-    """A format of JSON: its name, whether parsed JSON is of it, and its reader."""
-
-    name: str
-    recognises: Callable[[Any], bool]
-    read: Callable[[Request, Any], Detections]
-
-
-JSON_FORMATS = (
-    JsonFormat("COCO results", json_formats.is_results, json_formats.read_results),
-    JsonFormat("COCO data set", json_formats.is_dataset, json_formats.read_dataset),
-    JsonFormat("MMDetection", json_formats.is_mmdetection, json_formats.read_mmdetection),
-    JsonFormat("Ultralytics JSON", yolo.is_results, yolo.read_results),
-    JsonFormat("Label Studio", annotation_tools.is_label_studio, annotation_tools.read_label_studio),
-    JsonFormat("VIA", annotation_tools.is_via, annotation_tools.read_via),
+JSON_FORMATS: tuple[tuple[str, Callable[[Any], bool], Callable[[Request, Any], Detections]], ...] = (
+    ("COCO results", json_formats.is_results, json_formats.read_results),
+    ("COCO data set", json_formats.is_dataset, json_formats.read_dataset),
+    ("MMDetection", json_formats.is_mmdetection, json_formats.read_mmdetection),
+    ("Ultralytics JSON", yolo.is_results, yolo.read_results),
+    ("Label Studio", annotation_tools.is_label_studio, annotation_tools.read_label_studio),
+    ("VIA", annotation_tools.is_via, annotation_tools.read_via),
 )
+"""Name of each format of JSON, whether parsed JSON is of it, and its reader."""
 NAMES = (
-    "Ultralytics text", "WILDTRACK", *(one.name for one in JSON_FORMATS), "CVAT XML", "Parquet", "CSV", "MOTChallenge"
+    "Ultralytics text", "WILDTRACK", *(one for one, *_ in JSON_FORMATS), "CVAT XML", "Parquet", "CSV", "MOTChallenge"
 )  # fmt: skip
 """All formats, for messages."""
 
@@ -73,7 +63,7 @@ def _read(request: Request, path: Path) -> tuple[str, Detections] | None:
         return "CVAT XML", annotation_tools.read_cvat(request)
     if suffix == ".parquet":
         return "Parquet", tables.read_parquet(request)
-    if request.columns or _needs_mapping(path):
+    if request.source.columns or _needs_mapping(path):
         return "CSV", tables.read_csv(request)
     if tables.is_ground_truth(path):
         return "MOTChallenge truth", tables.read_ground_truth(request)
@@ -81,10 +71,10 @@ def _read(request: Request, path: Path) -> tuple[str, Detections] | None:
 
 
 def _read_json(request: Request, data: Any) -> tuple[str, Detections]:
-    for form in JSON_FORMATS:
-        if form.recognises(data):
-            with _of_form(request.path, form.name):
-                return form.name, form.read(request, data)
+    for name, recognises, read in JSON_FORMATS:
+        if recognises(data):
+            with _of_form(request.path, name):
+                return name, read(request, data)
     raise FormatError(request.path, "", "JSON of no known detections", f"one of {', '.join(NAMES)}")
 
 

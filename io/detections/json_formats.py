@@ -40,14 +40,14 @@ def is_dataset(data: Any) -> bool:
 
 def read_results(request: Request, data: Any) -> Detections:
     """Detections of COCO results, with the image list where the rig names one."""
-    if request.image_list is None:
+    if request.source.image_list is None:
         return _collect(request, data, None, {})
-    listed = read_json(request.image_list)
+    listed = read_json(request.source.image_list)
     if not (isinstance(listed, dict) and isinstance(listed.get("images"), list)):
         raise FormatError(
-            request.image_list, "images", "nothing", "the images of COCO results: id and file_name of each"
+            request.source.image_list, "images", "nothing", "the images of COCO results: id and file_name of each"
         )
-    return _collect(request, data, listed["images"], _categories(request.image_list, listed))
+    return _collect(request, data, listed["images"], _categories(request.source.image_list, listed))
 
 
 def read_dataset(request: Request, data: Any) -> Detections:
@@ -83,10 +83,12 @@ def _frames(request: Request, images: Any) -> tuple[dict[Any, int], int | None]:
     chosen = [
         (require(request.path, f"image {k}", one, "id"), str(one.get("file_name", "")))
         for k, one in enumerate(images)
-        if not request.select or fnmatch(str(one.get("file_name", "")), request.select)
+        if not request.source.select or fnmatch(str(one.get("file_name", "")), request.source.select)
     ]
     if not chosen:
-        raise SourceError(request.path, "select", f"no image like {request.select!r}", "a pattern of image names")
+        raise SourceError(
+            request.path, "select", f"no image like {request.source.select!r}", "a pattern of image names"
+        )
     frames, count = listed_frames([name for _, name in chosen])
     return dict(zip((image for image, _ in chosen), frames.tolist(), strict=True)), count
 
@@ -159,7 +161,7 @@ def is_wildtrack(data: Any) -> bool:
 
 def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Detections:
     """Boxes of one view; -1 marks a person that the view does not show."""
-    if request.view is None:
+    if request.source.view is None:
         raise FormatError(request.path, "view", "no number of the camera", "view = NUMBER in the rig's source, from 0")
     frames, count = listed_frames([path.name for path in paths])
     found, has_view = DetectionList(request.path), False
@@ -167,7 +169,7 @@ def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Dete
         for index, person in enumerate(people):
             place = f"{path.name}, person {index}"
             for view in require(request.path, place, person, "views"):
-                if require(request.path, place, view, "viewNum") != request.view:
+                if require(request.path, place, view, "viewNum") != request.source.view:
                     continue
                 has_view = True
                 corners = [require(request.path, place, view, key) for key in _KEYS]
@@ -175,6 +177,6 @@ def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Dete
                     found.add_corners(place, frame, corners, label="person")
     if not has_view:
         raise FormatError(
-            request.path, f"view {request.view}", "no such viewNum", "the camera's number in the files: view"
+            request.path, f"view {request.source.view}", "no such viewNum", "the camera's number in the files: view"
         )
     return found.done(count)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -17,6 +17,7 @@ import numpy as np
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.masks import Mask
+from stseg.io.recording.recording import Source
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
 from stseg.io.untrusted.values import abbreviated, finite_number, parse_number
@@ -27,20 +28,15 @@ _DIGITS = re.compile(r"[0-9]+")
 
 @dataclass(frozen=True)
 class Request:
-    """Request to a reader."""
+    """Request to a reader: a source, and the width and height of its camera's image, pixels."""
 
-    path: Path
-    """File or folder."""
+    source: Source
     size: tuple[int, int]
-    """Width and height of the camera's image, pixels."""
-    view: int | None = None
-    """Number of the camera in files that hold several, from 0; None where it is not given."""
-    select: str = ""
-    """Pattern of image names in files that hold several cameras' images; empty for all."""
-    image_list: Path | None = None
-    """File with the images of COCO results, or None."""
-    columns: Mapping[str, str] | None = None
-    """Names of the columns of a CSV or Parquet file, by the names of ours."""
+
+    @property
+    def path(self) -> Path:
+        """File or folder."""
+        return self.source.path
 
 
 @dataclass(frozen=True)

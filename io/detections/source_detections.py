@@ -64,15 +64,7 @@ def _stamp(*paths: Path) -> tuple[int, int]:
 
 @lru_cache(maxsize=64)
 def _read(source: Source, size: tuple[int, int], _stamp_of_file: tuple[int, int]) -> SourceDetections:
-    request = Request(
-        source.path,
-        size,
-        source.view,
-        source.select,
-        source.image_list,
-        dict(source.columns) if source.columns else None,
-    )
-    recognised = read_detections(request)
+    recognised = read_detections(Request(source, size))
     if recognised is None:
         if source.classes:
             raise SourceError(source.path, "classes", ", ".join(source.classes), "detections that have classes")

@@ -62,7 +62,7 @@ def read_parquet(request: Request) -> Detections:
             header = list(file.schema_arrow.names)
             if file.metadata.num_rows > limits.ROWS:
                 raise ValueError(f"{file.metadata.num_rows} rows, more than {limits.ROWS}")
-            wanted = sorted(set(known_columns(header, request.columns).values()))
+            wanted = sorted(set(known_columns(header, dict(request.source.columns)).values()))
             table = file.read([header[k] for k in wanted])
     except (OSError, ValueError, RuntimeError, load_extra("pyarrow", "parquet").ArrowException) as error:
         raise FormatError(request.path, "", f"no Parquet ({error})"[:100], "a Parquet file") from error
@@ -71,12 +71,12 @@ def read_parquet(request: Request) -> Detections:
     return _collect(request, table.column_names, rows)
 
 
-def known_columns(header: Sequence[str], columns: Mapping[str, str] | None) -> dict[str, int]:
+def known_columns(header: Sequence[str], columns: Mapping[str, str]) -> dict[str, int]:
     """Where our columns stand in a header, by the rig's mapping, our names, and the usual other names."""
     lower = [name.lower() for name in header]
     found: dict[str, int] = {}
     for column in COLUMNS:
-        for name in [columns[column]] if columns and column in columns else [column, *_SYNONYMS.get(column, ())]:
+        for name in [columns[column]] if column in columns else [column, *_SYNONYMS.get(column, ())]:
             if name in header or name.lower() in lower:
                 found[column] = header.index(name) if name in header else lower.index(name.lower())
                 break
@@ -84,8 +84,8 @@ def known_columns(header: Sequence[str], columns: Mapping[str, str] | None) -> d
 
 
 def _collect(request: Request, header: Sequence[str], rows: Sequence[tuple[str, Sequence[Any]]]) -> Detections:
-    at = known_columns(header, request.columns)
-    for column, name in (request.columns or {}).items():
+    at = known_columns(header, dict(request.source.columns))
+    for column, name in request.source.columns:
         if column not in at:
             raise FormatError(request.path, f"columns.{column}", f"no column {name}", one_of(name, list(header)))
     form = next((form for form in _FORMS if all(name in at for name in form)), None)

@@ -59,20 +59,10 @@ def _checked_notes(notes: object) -> dict[str, list[tuple[str, int]]]:
 
 
 class ArrivingFiles:
-    """The files of a pattern in the order of their names, numbers by value, each once it is complete.
+    """The files of a pattern such as `cam1_*.mp4` in the order of their names, numbers by value, once they are complete.
 
-    A file is complete when a later one exists, or when it has not grown for some time.
-
-    Parameters
-    ----------
-    pattern
-        Such as `cam1_*.mp4`.
-    settled
-        Time without growth after which the last file is complete, seconds.
-    halt
-        Ends all waiting.
-    report
-        Receives a line for each file that came too late to be read.
+    A file is complete when a later one exists, or when it has not grown for `settled` seconds. `halt` ends all
+    waiting; `report` receives a line for each file that came too late to be read.
     """
 
     def __init__(self, pattern: Path, settled: float, halt: Event, report: Callable[[str], None]) -> None:
@@ -121,18 +111,9 @@ class ArrivingFiles:
 
 
 class ArrivingVideos:
-    """One camera's frames from arriving files; reading waits for them.
+    """One camera's frames from arriving files of a pattern of colour or mask videos; reading waits for them.
 
-    Parameters
-    ----------
-    source, camera
-        A pattern of colour or mask videos.
-    files
-        The files of that pattern.
-    notes
-        Files that were read before; they are skipped unopened.
-    factor
-        Reduction of colour frames.
+    Files of `notes` were read before: they are skipped unopened. Colour frames are reduced by a whole factor.
     """
 
     def __init__(

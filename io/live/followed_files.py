@@ -25,22 +25,10 @@ _POLL = 0.2
 class FollowedFiles(AbstractContextManager["FollowedFiles"], Iterator[FrameSet]):
     """Frame sets of a recording whose videos arrive as files, a pattern each (see `stseg.io.live.live_stream.is_live`).
 
-    SourceError where a camera starts after the first frame, or, while iterating, where a video is broken.
-
-    Parameters
-    ----------
-    recording
-        The rig and its streams.
-    first, stop
-        The frames to read, half open; stop None while they come.
-    config
-        When a file counts as complete.
-    notes
-        Files that were read before.
-    halt
-        Ends the iteration.
-    report
-        Receives a line about files that are long awaited.
+    The frames are `first` to `stop`, half open; `stop` is None while they come. `config` says when a file counts as
+    complete, `notes` which files were read before. `halt` ends the iteration; `report` receives a line about files
+    that are long awaited. SourceError where a camera starts after the first frame or, while iterating, where a video
+    is broken.
     """
 
     def __init__(

@@ -29,20 +29,11 @@ _GREY, _INDEXED = 0, 3
 
 
 def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) -> AnyArray:
-    """One image file as an observation.
+    """One image file as an observation of a kind.
 
-    SourceError where the file cannot be read or decoded, or is not of that kind or size.
-
-    Parameters
-    ----------
-    path
-        The file.
-    kind
-        video or images: uint8 (v, u, 3) BGR; masks: uint8 (v, u); instances: uint16 (v, u).
-    size
-        Width and height that it must have, pixels.
-    key
-        Camera and frame, for errors.
+    video or images: uint8 (v, u, 3) BGR; masks: uint8 (v, u); instances: uint16 (v, u). `size` is the width and
+    height that it must have, pixels, `key` the camera and frame, for errors. SourceError where the file cannot be
+    read or decoded, or is not of that kind or size.
     """
     try:
         data = read_bytes(path, _MOST_BYTES)
