@@ -59,7 +59,7 @@ def _checked_notes(notes: object) -> dict[str, list[tuple[str, int]]]:
 
 
 class ArrivingFiles:
-    """The files of a pattern such as `cam1_*.mp4` in the order of their names, numbers by value, once they are complete.
+    """The files of a pattern such as `cam1_*.mp4` in the order of their names, numbers by value, once complete.
 
     A file is complete when a later one exists, or when it has not grown for `settled` seconds. `halt` ends all
     waiting; `report` receives a line for each file that came too late to be read.
