@@ -237,6 +237,7 @@ def test_a_pillar_is_as_tall_as_its_person() -> None:
 def test_the_axis_of_a_body_is_inside_its_outline(camera: Camera, height: float) -> None:
     view = OverlayView(camera, 640)
     polygons = pillar_outline(view, np.zeros(2), height)
+    assert len(polygons)
     axis = view.pixel(np.zeros((9, 2)), np.linspace(0.05, 0.95, 9) * height)
     for polygon in polygons:
         inside = [cv2.pointPolygonTest(polygon.astype(np.float32), tuple(map(float, point)), True) for point in axis]

@@ -97,11 +97,7 @@ def test_the_command_names_kinds_and_strengths(tmp_path: Path) -> None:
             simulate(tmp_path / "c", scene="tiny", spoil=(wrong,))
 
 
-CORNER = {"dilation": 4.0, "holes": 4.0, "rain": 4.0}
-"""Kinds at middle strength, and how far MODA may lie below 100, percent: one person more or less in ten frames."""
-
-
-@pytest.mark.parametrize("kind", CORNER)
+@pytest.mark.parametrize("kind", ["dilation", "holes", "rain"])
 def test_a_small_crowd_is_tracked_through_middle_errors(kind: str) -> None:
     spec = replace(NAMED["demo"], people=3, seconds=1.5)
     film = SceneFilm(spec, [Spoil(kind, STRENGTHS[kind][1])])
@@ -111,4 +107,4 @@ def test_a_small_crowd_is_tracked_through_middle_errors(kind: str) -> None:
         results += tracker.add([view.mask for view in frame_set.views])
     rows = tracker.tracks(results + tracker.finish()).trajectory
     moda = evaluate(np.concatenate(truth), rows, frames=np.arange(film.frames)).moda
-    assert moda is not None and moda > 100 - CORNER[kind]
+    assert moda is not None and moda >= 99.0

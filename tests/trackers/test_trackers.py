@@ -95,7 +95,9 @@ def test_no_frames_no_commits() -> None:
 
 @pytest.mark.parametrize("tracker", COLOURLESS)
 def test_labels_say_who(tracker: str) -> None:
-    for commit in run(tracker, 0, 20):
+    commits = run(tracker, 0, 20)
+    assert [at.frame for commit in commits for at in commit.frames] == list(range(20))
+    for commit in commits:
         for at, label in zip(commit.frames, commit.label, strict=True):
             own = commit.trajectory[commit.trajectory["frame"] == at.frame]
             assert set(np.unique(label).tolist()) == {0, *own["id"].tolist()}
@@ -235,6 +237,7 @@ def test_events_in_rows() -> None:
 
 def test_commits_follow_each_other() -> None:
     commits = run("cut", 3, 30)
+    assert len(commits) > 1
     for before, after in pairwise(commits):
         assert before.windows["commit_stop"][0] == after.windows["commit_first"][0]
         assert before.frames[-1].frame + 1 == after.frames[0].frame

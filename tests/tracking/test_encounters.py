@@ -84,7 +84,9 @@ def test_who_stands_stands_and_who_walks_swings_and_looks_ahead() -> None:
 def test_nobody_walks_through_anybody_or_faster_than_people_walk(name: str) -> None:
     spec = NAMED[name]
     before: dict[int, np.ndarray[tuple[int], np.dtype[np.float64]]] = {}
-    for crowd in walk_routes(spec):
+    crowds = list(walk_routes(spec))
+    assert len(crowds) == spec.frames
+    for crowd in crowds:
         for a, b in combinations(crowd.ground, 2):
             assert np.hypot(*(a - b)) > 0.39
         now = dict(zip(crowd.id.tolist(), crowd.ground, strict=True))
