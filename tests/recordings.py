@@ -13,6 +13,7 @@ from scenes import box_frame_sets, looking, rig_of, walkers
 
 from stseg.arrays import Boxes
 from stseg.commands.main import main
+from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 from stseg.kernels.accelerate import COMPILED
@@ -24,6 +25,20 @@ ALONE = ("--workers", "1")
 """In this process alone."""
 compiled_only = pytest.mark.skipif(not COMPILED, reason="too slow without a compiler")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+def data_path(name: str) -> Path:
+    """A data set, or a file of one; the test is skipped where it is not here."""
+    path = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data")) / name
+    if not path.exists():
+        pytest.skip(f"{name} is not here: set STSEG_DATA to the folder of the data sets")
+    return path
+
+
+def blank_recording(*sources: CameraSource, size: tuple[int, int] = (16, 12), rate: float = 5.0) -> Recording:
+    """Cameras cam1, cam2, ... that look straight down on a square metre."""
+    cameras = tuple(Camera(f"cam{k}", size, np.eye(3), np.array([0.0, 0.0, -1.0])) for k in range(1, len(sources) + 1))
+    return Recording(Path("rig.toml"), Rig("test", rate, Grid((0, 1), (0, 1)), cameras), sources)
 
 
 def write_recording(folder: Path) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from recordings import data_path
 from refusals import refused
 
 from stseg.arrays import Bytes
@@ -21,7 +21,6 @@ from stseg.io.detections.record import Detections
 from stseg.io.detections.source_detections import instance_image, read_source
 from stseg.io.recording.recording import Source
 
-DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 SIZE = (64, 48)
 
 
@@ -124,9 +123,7 @@ def test_each_box_is_found_in_its_frame_in_the_order_of_the_file(tmp_path: Path,
 
 @pytest.mark.parametrize(("name", "frames", "boxes"), [("CMC1_Cam1", 261, 1187), ("CMC2_Cam4", 263, 2221)])
 def test_real_detections(name: str, frames: int, boxes: int) -> None:
-    path = DATA / "cmc" / f"DET_{name}.txt"
-    if not path.is_file():
-        pytest.skip("no cmc data")
+    path = data_path(f"cmc/DET_{name}.txt")
     table = read_boxes(path, first_frame=1)
     assert table.frames == frames
     assert sum(len(table.at(frame)) for frame in range(frames)) == boxes

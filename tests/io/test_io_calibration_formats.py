@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from recordings import data_path
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
 from refusals import refused
 from scipy.io import savemat
@@ -27,7 +27,6 @@ from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, media
 from stseg.io.calibrations.xml_files import read_tsai_xml
 from stseg.io.recording.rigs import read_recording
 
-DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 SIZE = (640, 480)
 MATRIX = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])
 DISTORTION = np.array(BARREL)
@@ -53,13 +52,6 @@ def expected(turn: float, distortion: Floats) -> Floats:
 
 def pixels(foreign: ForeignCamera, world: World) -> Floats:
     return world.camera(foreign, foreign.name, foreign.size or SIZE).project(GROUND, HEIGHTS)[0]
-
-
-def data_file(name: str) -> Path:
-    path = DATA / name
-    if not path.exists():
-        pytest.skip(f"{name} is not here: set STSEG_DATA to the folder of the data sets")
-    return path
 
 
 def krt(path: Path) -> Path:
@@ -204,7 +196,7 @@ def tsai_pixels(file: Path, points: Floats) -> Floats:
 class TestTsai:
     @pytest.mark.parametrize("view", range(1, 9))
     def test_real_views_to_a_hundredth_of_a_pixel(self, view: int) -> None:
-        file = data_file(f"pets2009/calibration/View_00{view}.xml")
+        file = data_path(f"pets2009/calibration/View_00{view}.xml")
         (foreign,) = read_tsai_xml([file])
         camera = World("mm").camera(foreign, foreign.name, foreign.size or SIZE)
         ground = np.stack(np.meshgrid(np.linspace(-40, 40, 101), np.linspace(-40, 40, 101)), -1).reshape(-1, 2)
@@ -228,7 +220,7 @@ class TestTsai:
 
 class TestKrtData:
     def test_shelf(self) -> None:
-        file = data_file("shelf/calibration.json")
+        file = data_path("shelf/calibration.json")
         cameras = read_krt_json([file])
         assert (guess_unit(cameras, guess_up(cameras)), guess_up(cameras)) == ("m", "+z")
         for foreign, raw in zip(cameras, json.loads(file.read_text()).values(), strict=True):

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import h5py
@@ -9,6 +8,7 @@ import pytest
 from cyclopts import CycloptsError
 from hypothesis import given
 from hypothesis import strategies as st
+from recordings import data_path
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
 from refusals import refused
 from strategies import BARREL, Pose, numbers, poses
@@ -23,7 +23,6 @@ from stseg.io.calibrations.world_frame import Up, World
 from stseg.io.calibrations.xml_files import read_opencv_xml
 from stseg.io.recording.rigs import read_recording
 
-DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 SIZE = (640, 480)
 MATRIX = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])
 # A camera 2 m above the origin that looks along y and down, in millimetres with Z pointing down, as `uu4`'s.
@@ -31,13 +30,6 @@ ROTATION = np.array([-1.2, 0.0, 0.0])
 TRANSLATION = 2000.0 * np.array([0.0, np.sin(1.2), np.cos(1.2)])
 GROUND = np.array([[0.3, 1.0], [-0.4, 1.5], [0.0, 2.0], [0.8, 3.0]])
 HEIGHTS = np.array([0.0, 0.5, 1.1, 1.8])
-
-
-def data_set(name: str) -> Path:
-    folder = DATA / name
-    if not folder.is_dir():
-        pytest.skip(f"the data set {name} is not here: set STSEG_DATA to its parent folder")
-    return folder
 
 
 def xml(**nodes: Floats | str) -> str:
@@ -202,7 +194,7 @@ class TestRealCalibrations:
 
     @pytest.mark.parametrize("name", ["uu1", "uu4"])
     def test_one_xml_in_millimetres_with_z_down(self, name: str) -> None:
-        files = sorted(data_set(name).glob("cam*/config.xml"))
+        files = sorted(data_path(name).glob("cam*/config.xml"))
         assert len(files) == 4
         grid = np.stack(np.meshgrid(np.linspace(-1.5, 1.5, 7), np.linspace(-2.5, 0.5, 7)), -1).reshape(-1, 2)
         for file in files:
@@ -215,7 +207,7 @@ class TestRealCalibrations:
                 np.testing.assert_allclose(pixel[seen], expected[seen], rtol=0, atol=1e-6)
 
     def test_intrinsic_and_extrinsic_in_centimetres(self) -> None:
-        folder = data_set("wildtrack") / "calibrations"
+        folder = data_path("wildtrack") / "calibrations"
         grid = np.stack(np.meshgrid(np.linspace(-2.5, 8.5, 8), np.linspace(-8.5, 26.5, 9)), -1).reshape(-1, 2)
         for name in ("CVLab1", "CVLab2", "CVLab3", "CVLab4", "IDIAP1", "IDIAP2", "IDIAP3"):
             files = [folder / f"intrinsic_zero/intr_{name}.xml", folder / f"extrinsic/extr_{name}.xml"]
@@ -229,7 +221,7 @@ class TestRealCalibrations:
                 np.testing.assert_allclose(pixel[seen], expected[seen], rtol=0, atol=1e-6)
 
     def test_matlab_matrices_in_metres(self) -> None:
-        files = sorted(data_set("cmc").glob("cam*_cam_mat.mat"))
+        files = sorted(data_path("cmc").glob("cam*_cam_mat.mat"))
         assert len(files) == 4
         grid = np.stack(np.meshgrid(np.linspace(2.0, 6.0, 5), np.linspace(0.0, 3.4, 5)), -1).reshape(-1, 2)
         for file in files:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import struct
 from dataclasses import replace
 from itertools import pairwise
@@ -13,22 +12,16 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from recordings import blank_recording, data_path
 from refusals import refused
 
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError, StsegError
-from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.aligned_stream import StreamIndex, count_frames, index_streams
 from stseg.io.recording.frames import FrameSet, open_frames, read_background, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
 
-DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 SIZE = (16, 12)
-
-
-def recording(*sources: CameraSource, size: tuple[int, int] = SIZE) -> Recording:
-    cameras = tuple(Camera(f"cam{i}", size, np.eye(3), np.array([0.0, 0.0, -1.0])) for i in range(1, len(sources) + 1))
-    return Recording(Path("rig.toml"), Rig("test", 5.0, Grid((0, 1), (0, 1)), cameras), sources)
 
 
 def shade(frame: int) -> AnyArray:
@@ -90,7 +83,7 @@ def test_each_kind_gives_its_array(
     tmp_path: Path, kind: SourceKind, shape: tuple[int, ...], dtype: type[np.generic]
 ) -> None:
     path = video(tmp_path / "a.avi", 3) if kind == "video" else images(tmp_path / "a", 3)
-    rec = recording(CameraSource(Source(kind, path)))
+    rec = blank_recording(CameraSource(Source(kind, path)))
     with open_frames(rec) as reader:
         for frame_set in reader:
             (view,) = frame_set.views
@@ -103,7 +96,7 @@ def test_each_kind_gives_its_array(
 
 
 def test_all_kinds_together(tmp_path: Path) -> None:
-    rec = recording(
+    rec = blank_recording(
         CameraSource(Source("video", video(tmp_path / "a.avi", 4))),
         CameraSource(Source("masks", video(tmp_path / "b.avi", 4))),
         CameraSource(Source("masks", images(tmp_path / "c", 4) / "frame_*.png")),
@@ -116,7 +109,7 @@ def test_all_kinds_together(tmp_path: Path) -> None:
 
 
 def test_mask_videos_of_lossy_codecs_are_grey(tmp_path: Path) -> None:
-    rec = recording(CameraSource(Source("masks", video(tmp_path / "a.avi", 3, "MJPG"))))
+    rec = blank_recording(CameraSource(Source("masks", video(tmp_path / "a.avi", 3, "MJPG"))))
     with open_frames(rec) as reader:
         views = [np.asarray(frame_set.views[0]) for frame_set in reader]
     np.testing.assert_allclose(views, [shade(frame) for frame in range(3)], atol=2)
@@ -129,7 +122,7 @@ def test_frames_are_counted_by_decoding(tmp_path: Path) -> None:
         struct.pack_into("<I", data, data.index(name) + 8 + total, 7)
     path.write_bytes(data)
     assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 7
-    rec = recording(CameraSource(Source("video", path)))
+    rec = blank_recording(CameraSource(Source("video", path)))
     assert count_frames(rec) == 5
     assert len(shown(rec)) == 5
 
@@ -137,22 +130,22 @@ def test_frames_are_counted_by_decoding(tmp_path: Path) -> None:
 def test_a_frame_without_boxes_is_no_blind_view(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("1 -1 0 0 5 5 -1\n3 -1 0 0 5 5 -1\n")
-    with open_frames(recording(CameraSource(Source("boxes", path, first_frame=1, frames=4)))) as reader:
+    with open_frames(blank_recording(CameraSource(Source("boxes", path, first_frame=1, frames=4)))) as reader:
         views = [frame_set.views[0] for frame_set in reader]
     assert [isinstance(view, Boxes) and len(view) for view in views] == [1, 0, 1, 0]
 
 
 def test_offsets_align_cameras(tmp_path: Path) -> None:
     early, late = box_camera(tmp_path, 6, offset=-2), box_camera(tmp_path, 3, offset=1)
-    assert shown(recording(early, late), first=1) == [(1, 3, 0), (2, 4, 1), (3, 5, 2)]
-    assert count_frames(recording(early, late)) == 4
+    assert shown(blank_recording(early, late), first=1) == [(1, 3, 0), (2, 4, 1), (3, 5, 2)]
+    assert count_frames(blank_recording(early, late)) == 4
 
 
 def test_a_late_camera_is_an_error_or_blind(tmp_path: Path) -> None:
     punctual = box_camera(tmp_path, 3)
     with pytest.raises(SourceError, match="camera cam2, frame 1: found a stream that starts at frame 2"):
-        open_frames(recording(punctual, box_camera(tmp_path, 1, offset=2)), first=1)
-    rec = recording(punctual, box_camera(tmp_path, 1, offset=2, blind=True))
+        open_frames(blank_recording(punctual, box_camera(tmp_path, 1, offset=2)), first=1)
+    rec = blank_recording(punctual, box_camera(tmp_path, 1, offset=2, blind=True))
     assert shown(rec) == [(0, 0, None), (1, 1, None), (2, 2, 0)]
 
 
@@ -163,22 +156,22 @@ def test_a_short_camera_is_an_error_or_blind(tmp_path: Path) -> None:
         "expected frames as long as camera cam1"
     )
     seen: list[FrameSet] = []
-    with pytest.raises(SourceError, match=reported), open_frames(recording(whole, short)) as reader:
+    with pytest.raises(SourceError, match=reported), open_frames(blank_recording(whole, short)) as reader:
         seen.extend(reader)
     assert [frame_set.frame for frame_set in seen] == [0, 1]
-    refused(SourceError, reported, count_frames, recording(whole, short))
+    refused(SourceError, reported, count_frames, blank_recording(whole, short))
     for stop in (None, 4):
-        refused(SourceError, reported, shown, recording(whole, short), 3, stop)
-    assert shown(recording(whole, short), 0, 2) == [(0, 0, 0), (1, 1, 1)]
-    rec = recording(whole, box_camera(tmp_path, 2, blind=True))
+        refused(SourceError, reported, shown, blank_recording(whole, short), 3, stop)
+    assert shown(blank_recording(whole, short), 0, 2) == [(0, 0, 0), (1, 1, 1)]
+    rec = blank_recording(whole, box_camera(tmp_path, 2, blind=True))
     assert shown(rec) == [(0, 0, 0), (1, 1, 1), (2, 2, None), (3, 3, None)]
     assert count_frames(rec) == 4
 
 
 def test_a_recording_ends_with_its_required_cameras(tmp_path: Path) -> None:
-    rec = recording(box_camera(tmp_path, 2), box_camera(tmp_path, 5, blind=True))
+    rec = blank_recording(box_camera(tmp_path, 2), box_camera(tmp_path, 5, blind=True))
     assert [row[0] for row in shown(rec)] == [0, 1]
-    both_blind = recording(box_camera(tmp_path, 2, blind=True), box_camera(tmp_path, 5, blind=True))
+    both_blind = blank_recording(box_camera(tmp_path, 2, blind=True), box_camera(tmp_path, 5, blind=True))
     assert shown(both_blind, 3) == [(3, None, 3), (4, None, 4)]
     assert count_frames(both_blind) == 5
 
@@ -188,7 +181,7 @@ def test_a_recording_ends_with_its_required_cameras(tmp_path: Path) -> None:
 def test_ranges_beyond_the_end_are_errors(
     tmp_path: Path, blind: bool, first: int, stop: int | None, least: int
 ) -> None:
-    rec = recording(box_camera(tmp_path, 3, blind=blind))
+    rec = blank_recording(box_camera(tmp_path, 3, blind=blind))
     with pytest.raises(
         SourceError, match=f"rig.toml: frames: found a recording of 3 frames, expected at least {least}"
     ):
@@ -197,7 +190,7 @@ def test_ranges_beyond_the_end_are_errors(
 
 @pytest.mark.parametrize(("first", "stop"), [(-1, None), (3, 2)])
 def test_ranges_that_are_none_are_errors(tmp_path: Path, first: int, stop: int | None) -> None:
-    refused(ConfigError, "0 <= first <= stop", open_frames, recording(box_camera(tmp_path, 3)), first, stop)
+    refused(ConfigError, "0 <= first <= stop", open_frames, blank_recording(box_camera(tmp_path, 3)), first, stop)
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -208,7 +201,7 @@ def test_ranges_that_are_none_are_errors(tmp_path: Path, first: int, stop: int |
 def test_the_split_of_a_recording_does_not_matter(
     tmp_path: Path, cameras: list[tuple[int, int]], cuts: set[int]
 ) -> None:
-    rec = recording(*[box_camera(tmp_path, frames, offset, blind=True) for frames, offset in cameras])
+    rec = blank_recording(*[box_camera(tmp_path, frames, offset, blind=True) for frames, offset in cameras])
     length = max(frames + offset for frames, offset in cameras)
     assume(length >= 0)
     own = [[f - offset if 0 <= f - offset < frames else None for frames, offset in cameras] for f in range(length)]
@@ -218,14 +211,14 @@ def test_the_split_of_a_recording_does_not_matter(
 
 
 def test_skipping_in_a_video_is_exact(tmp_path: Path) -> None:
-    rec = recording(CameraSource(Source("video", video(tmp_path / "a.mp4", 20, "mp4v")), offset=-3))
+    rec = blank_recording(CameraSource(Source("video", video(tmp_path / "a.mp4", 20, "mp4v")), offset=-3))
     with open_frames(rec, 7, 9) as reader:
         views = [frame_set.views[0] for frame_set in reader]
     np.testing.assert_allclose([np.mean(view) for view in views if isinstance(view, np.ndarray)], [100, 110], atol=4.5)
 
 
 def test_reading_goes_on_where_it_was_left(tmp_path: Path) -> None:
-    with open_frames(recording(box_camera(tmp_path, 4))) as reader:
+    with open_frames(blank_recording(box_camera(tmp_path, 4))) as reader:
         assert next(reader).frame == 0
         assert [frame_set.frame for frame_set in reader] == [1, 2, 3]
         assert list(reader) == []
@@ -234,7 +227,7 @@ def test_reading_goes_on_where_it_was_left(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["video", "masks", "images"])
 def test_pictures_of_another_size_are_refused(tmp_path: Path, kind: SourceKind) -> None:
     path = images(tmp_path / "a", 2) if kind == "images" else video(tmp_path / "a.avi", 2)
-    rec = recording(CameraSource(Source(kind, path)), size=(20, 12))
+    rec = blank_recording(CameraSource(Source(kind, path)), size=(20, 12))
     refused(SourceError, "camera cam1, frame 0: found an image of 16x12, expected 20x12", shown, rec)
 
 
@@ -246,7 +239,7 @@ def beside(folder: Path, detections: int, frames: int, offset: int = 0) -> Camer
 
 def test_colour_frames_stand_beside_detections(tmp_path: Path) -> None:
     """Frame k of the images is that of frame k of the boxes; more of them are left over."""
-    rec = recording(box_camera(tmp_path, 5), beside(tmp_path, 3, 9, offset=2))
+    rec = blank_recording(box_camera(tmp_path, 5), beside(tmp_path, 3, 9, offset=2))
     with open_frames(rec, 2, 5) as reader:
         told = [(number(frame_set.views[1]), *map(number, frame_set.images)) for frame_set in reader]
     assert told == [(0, None, 0), (1, None, 1), (2, None, 2)]
@@ -255,14 +248,14 @@ def test_colour_frames_stand_beside_detections(tmp_path: Path) -> None:
 
 
 def test_colour_frames_end_no_sooner_than_detections(tmp_path: Path) -> None:
-    rec = recording(beside(tmp_path, 5, 3))
+    rec = blank_recording(beside(tmp_path, 5, 3))
     refused(SourceError, "camera cam1, images: found its end at frame 3, where the detections go on", shown, rec)
-    other = recording(beside(tmp_path, 4, 4), size=(20, 12))
+    other = blank_recording(beside(tmp_path, 4, 4), size=(20, 12))
     refused(SourceError, "camera cam1, frame 0: found an image of 16x12, expected 20x12", shown, other)
 
 
 def test_a_broken_image_is_named(tmp_path: Path) -> None:
-    rec = recording(box_camera(tmp_path, 3), CameraSource(Source("images", images(tmp_path / "a", 3))))
+    rec = blank_recording(box_camera(tmp_path, 3), CameraSource(Source("images", images(tmp_path / "a", 3))))
     (tmp_path / "a" / "frame_6.png").write_bytes(b"broken")
     refused(SourceError, r"frame_6\.png: camera cam2, frame 1: found a broken file", shown, rec)
 
@@ -287,7 +280,7 @@ def test_sources_that_cannot_be_read(
     (tmp_path / "text.avi").write_text("no video, no boxes")
     (tmp_path / "empty.avi").touch()
     (tmp_path / "folder").mkdir()
-    rec = recording(box_camera(tmp_path, 3), CameraSource(Source(kind, tmp_path / name)))
+    rec = blank_recording(box_camera(tmp_path, 3), CameraSource(Source(kind, tmp_path / name)))
     with pytest.raises((SourceError, FormatError), match=reported) as caught:
         shown(rec)
     assert isinstance(caught.value, StsegError)
@@ -296,7 +289,7 @@ def test_sources_that_cannot_be_read(
 
 def test_background_is_read_by_camera(tmp_path: Path) -> None:
     source = Source("video", video(tmp_path / "a.avi", 2))
-    rec = recording(
+    rec = blank_recording(
         CameraSource(source), CameraSource(source, background=Source("images", images(tmp_path / "empty", 3)))
     )
     assert [number(view) for view in read_background(rec, 1)] == [0, 1, 2]
@@ -304,14 +297,12 @@ def test_background_is_read_by_camera(tmp_path: Path) -> None:
 
 
 def test_real_silhouettes_and_boxes() -> None:
-    if not (DATA / "uu4").is_dir():
-        pytest.skip("no uu4 data")
-    folders = [DATA / "uu4" / f"cam{i}" for i in range(1, 5)]
+    folders = [data_path("uu4") / f"cam{i}" for i in range(1, 5)]
     cameras = [
         CameraSource(Source("masks", folder / "foreground_cropped.avi"), Source("video", folder / "background.avi"))
         for folder in folders
     ]
-    rec = recording(*cameras, size=(644, 486))
+    rec = blank_recording(*cameras, size=(644, 486))
     assert count_frames(rec) == 272
     with open_frames(rec, 270) as reader:
         frame_sets = list(reader)
@@ -355,7 +346,7 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def camera_of(path: Path, *more: Path) -> Recording:
-    return recording(CameraSource(Source("video", path, more=more)), size=(64, 48))
+    return blank_recording(CameraSource(Source("video", path, more=more)), size=(64, 48))
 
 
 @pytest.mark.parametrize("first", [0, 1, 249, 251, 299, 300, 301, 555, 599, 600, 899])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,11 @@ import pytest
 from films import write_at_rate, write_stamped
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from recordings import blank_recording
 
 from stseg.arrays import Boxes, Bytes, Floats, Ints, Observation
 from stseg.engine.offline.segments import find_gaps
 from stseg.errors import RigError, SourceError
-from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
@@ -26,14 +27,9 @@ from stseg.io.runfile.provenance import gather_provenance
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 
 RATE = 10.0
+recording = partial(blank_recording, rate=RATE)
 SIZE = (16, 12)
 NONE = np.zeros(0)
-
-
-def recording(*sources: CameraSource) -> Recording:
-    eye = np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])
-    cameras = tuple(Camera(f"cam{k}", SIZE, eye, np.array([0.0, 0.0, -1.0])) for k in range(1, len(sources) + 1))
-    return Recording(Path("rig.toml"), Rig("test", RATE, Grid((0, 1), (0, 1)), cameras), sources)
 
 
 def video(name: str = "a.mp4", **reported: object) -> CameraSource:

@@ -18,8 +18,10 @@ import shapely
 import silx.io
 import silx.io.nxdata
 import xarray
+from recordings import data_path
 from run_files import FRAMES, small_ghosts, small_trajectory, small_volume, write_small_run
 
+from stseg.commands.main import main
 from stseg.errors import ConfigError
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
@@ -34,6 +36,7 @@ AXES = {
     "x": ("m", np.array([0.05, 0.15, 0.25, 0.35, 0.45, 0.55])),
 }
 SHAPE = (3, 5, 7)
+UU4_FRAMES = 24
 
 
 @pytest.fixture(scope="module")
@@ -225,3 +228,52 @@ def test_labels_that_were_packed_otherwise_are_refused(label: np.ndarray, wrong:
     }
     with pytest.raises(ValueError, match=r".+"):
         unpacked_label(frames[wrong], SHAPE)
+
+
+@pytest.fixture(scope="module")
+def uu4_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder, data = tmp_path_factory.mktemp("uu4"), data_path("uu4")
+    rig, run, names = folder / "rig.toml", folder / "run.h5", [f"cam{k}" for k in range(1, 5)]
+    calibrations = [str(data / name / "config.xml") for name in names]
+    masks = f"{data.resolve()}/{{name}}/foreground_cropped.avi"
+    given = ["--size", "644,486", "--unit", "mm", "--up=-z", "--area=-2.5,-4.5,2.5,1.5", "--frame-rate", "5"]
+    given += ["--source-pattern", masks, "--source-kind", "masks"]
+    assert main(["calibrate", "import", "opencv", *calibrations, "-o", str(rig), *given]) == 0
+    assert main(["run", str(rig), "-o", str(run), "--frames", f"0:{UU4_FRAMES}"]) == 0
+    return run
+
+
+def test_silx_shows_real_cameras(uu4_run: Path) -> None:
+    with silx.io.open(str(uu4_run)) as file:
+        shown = silx.io.nxdata.get_default(file)
+        assert (shown.is_valid, shown.signal_dataset_name, shown.signal.shape) == (
+            True,
+            "log_odds",
+            (UU4_FRAMES, 10, 60, 50),
+        )
+        assert [axis.attrs["units"] for axis in shown.axes] == ["s", "m", "m", "m"]
+        np.testing.assert_allclose(shown.axes[0][()], np.arange(UU4_FRAMES) / 5)
+
+
+def test_xarray_finds_people_in_the_volume(uu4_run: Path) -> None:
+    """Where somebody is, the volume is for a person and has their label."""
+    run = read_run(uu4_run)
+    with xarray.open_dataset(uu4_run, group="entry/occupancy", engine="h5netcdf", phony_dims="access") as volume:
+        assert volume.x.attrs["units"] == "m"
+        np.testing.assert_allclose(volume.y[[0, -1]], [-4.45, 1.45])
+        here = run.trajectory[run.trajectory["frame"] == 12]
+        assert len(here) == 4
+        for row in here:
+            cell = volume.sel(time=12 / 5, plane=0.8, x=row["raw_x"], y=row["raw_y"], method="nearest")
+            assert (int(cell.label), float(cell.log_odds) > 0) == (row["id"], True)
+
+
+def test_pedpy_measures_how_they_walk(uu4_run: Path) -> None:
+    data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=uu4_run)
+    area = pedpy.load_walkable_area_from_ped_data_archive_hdf5(trajectory_file=uu4_run)
+    assert (data.frame_rate, area.area) == (5.0, pytest.approx(30.0))
+    assert data.data.groupby("frame").size().tolist() == [4] * UU4_FRAMES
+    speed = pedpy.compute_individual_speed(
+        traj_data=data, frame_step=2, speed_calculation=pedpy.SpeedCalculation.BORDER_SINGLE_SIDED
+    )
+    assert 0.2 < speed["speed"].median() < 2.5  # metres per second: they walk
