@@ -138,7 +138,7 @@ def inside_bodies(grid: Grid, near_person: Ints, ground: Floats, height: Floats)
 
     Parameters
     ----------
-    near : int64 (y, x)
+    near_person : int64 (y, x)
         The person near each cell, -1 for none.
     ground, height : float64 (person, 2), (person,)
         Metres.

@@ -167,11 +167,7 @@ def _candidate_rows(frame: int, status: int, people: People) -> Rows:
     rows = np.zeros(len(people), CANDIDATE)
     rows["frame"], rows["status"], rows["height"], rows["evidence"] = frame, status, people.height, people.evidence
     rows["x"], rows["y"] = people.ground[:, 0], people.ground[:, 1]
-    rows["xx"], rows["xy"], rows["yy"] = (
-        people.covariance[:, 0, 0],
-        people.covariance[:, 0, 1],
-        people.covariance[:, 1, 1],
-    )
+    rows["xx"], rows["xy"], rows["yy"] = people.covariance.reshape(-1, 4).T[[0, 1, 3]]
     return rows
 
 

@@ -29,7 +29,7 @@ def nearest_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
 
 @kernel
 def _fill_nearest(ground: Floats, people_ground: Floats, reach: float, nearest: Ints) -> None:
-    """Fill near (place,); the square of the reach is searched first."""
+    """Fill nearest (place,); the square of the reach is searched first."""
     nearest[:] = -1
     for c in range(len(ground)):
         least = np.inf

@@ -124,7 +124,7 @@ def _fill_boxes(
 
 @part
 def _extent(along_x: float, along_y: float) -> float:
-    """Pixels that a cell spans, from its pixel's differences over `_STEP` of a cell; 1 where they are not numbers."""
+    """Pixels that a cell spans, from its pixel's differences over a share of a cell; 1 where they are not numbers."""
     extent = math.sqrt((along_x / _DERIVATIVE_STEP) ** 2 + (along_y / _DERIVATIVE_STEP) ** 2)
     return 1.0 if math.isnan(extent) else extent
 

@@ -1,7 +1,7 @@
 """Summed-area tables (Crow 1984): means over the footprints of cells, four look-ups each.
 
-Likelihoods are taken in whole levels of 1 / TOP, so that sums are exact, and modulo 2^32, which does no harm: the sum
-over a footprint comes from four entries by differences, and is itself below 2^32.
+Likelihoods are taken in whole levels of 1 / TOP_LEVEL, so that sums are exact, and modulo 2^32, which does no harm: the
+sum over a footprint comes from four entries by differences, and is itself below 2^32.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ UNSEEN = -1
 
 Sums = NDArray[np.uint32]
 Levels = NDArray[np.int16]
-"""int16 (plane, y, x): mean likelihood of each cell's footprint in units of 1 / TOP, or UNSEEN."""
+"""int16 (plane, y, x): mean likelihood of each cell's footprint in units of 1 / TOP_LEVEL, or UNSEEN."""
 
 
 class SumTable(NamedTuple):
@@ -68,7 +68,7 @@ def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
     Returns
     -------
     int
-        The lowest level of that part; TOP where there is none.
+        The lowest level of that part; TOP_LEVEL where there is none.
     """
     columns = sums.shape[1] - 1
     row, lowest = np.empty(columns, np.uint32), np.full(columns, TOP_LEVEL, np.uint32)

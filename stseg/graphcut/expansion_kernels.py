@@ -71,7 +71,7 @@ def prune_unchanged(cells: Ints, adjacency: Neighbours, changed: Ints, since: in
 
     Parameters
     ----------
-    cells, near, node
+    cells, adjacency, node
         As of `fill_move`.
     changed : int64 (n,)
         Move in which each node last changed.
@@ -116,7 +116,7 @@ def prune_unprofitable(
 
     Parameters
     ----------
-    alpha, cells, labels, near, node
+    alpha, cells, labels, adjacency, node
         As of `fill_move`.
     gain : int64 (k,)
         Gain of alpha by unary costs; overwritten.

@@ -20,7 +20,7 @@ class Lattice(NamedTuple):
     ----------
     steps : int32 (degree,)
         Difference of node numbers along each arc within a frame; slots 2 i and 2 i + 1 are opposite.
-    forward, behind : int32 (node,)
+    forward, backward : int32 (node,)
         Difference of node numbers to the successor in the next frame and to the predecessor; 0 for none.
     spatial
         Number of arc slots within a frame; those after it lead to the next (even) and previous frame (odd).

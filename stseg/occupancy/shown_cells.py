@@ -13,7 +13,7 @@ the summed-area tables that hold the likelihoods and the people's pixels.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,12 +96,6 @@ class _MarkedCells(NamedTuple):
     unseen: Levels
     number: Floats
 
-    @classmethod
-    def none(cls) -> Self:
-        """Before the first frame."""
-        nothing = np.zeros(0, np.int32)
-        return cls(np.zeros(0, bool), nothing, nothing, nothing, nothing, np.zeros((0, 0), np.int16), np.zeros(0))
-
 
 class CellTables:
     """Tables of a rig's cells, and the cells of the last frame's blocks.
@@ -115,7 +109,7 @@ class CellTables:
     def __init__(self, footprint: Footprints) -> None:
         self.footprint = footprint
         self.reach = [_reach(boxes) for boxes in footprint]
-        self._cells = _MarkedCells.none()
+        self._cells: _MarkedCells | None = None
 
     @cached_property
     def sets(self) -> ViewSets:
@@ -148,7 +142,7 @@ class CellTables:
         """
         if marked.mean() > _NEARLY_ALL:
             marked = np.ones_like(marked)
-        if not np.array_equal(marked, self._cells.marked):
+        if self._cells is None or not np.array_equal(marked, self._cells.marked):
             self._cells = self._cells_of(marked, views)
         _, cell, place, block, start, unseen, number = self._cells
         person = np.full(len(number), -1, np.int32)

@@ -7,7 +7,6 @@ the slice, so that a slice that was hardly seen says nothing. Views are apart: c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -54,15 +53,14 @@ class BodyRows(NamedTuple):
     feet: Floats
 
 
-@dataclass(frozen=True)
-class ColourSums:
+class ColourSums(NamedTuple):
     """Sums over pixels, from which an appearance is learned.
 
     Attributes
     ----------
     track : int64 (n,)
         Ids, ascending.
-    count : float64 (n, SLICES)
+    pixels : float64 (n, SLICES)
     first : float64 (n, SLICES, 3)
         Sums of colours.
     second : float64 (n, SLICES, 3, 3)
@@ -70,7 +68,7 @@ class ColourSums:
     """
 
     track: Ints
-    count: Floats
+    pixels: Floats
     first: Floats
     second: Floats
 
@@ -84,14 +82,12 @@ class ColourSums:
         """Add the pixels of a frame that one person surely covers; image uint8 (v, u, 3) is the window's."""
         place = np.searchsorted(self.track, track)
         people, corner = likelihood.people, (likelihood.left, likelihood.top)
-        _add_colours(
-            people.edges, people.first, people.share, corner, rows, place, image, self.count, self.first, self.second
-        )  # fmt: skip
+        _add_colours(people, corner, rows, place, image, self)
 
     def appearance(self) -> Appearance:
         """Means and covariances, shrunk to those of all tracks."""
         count, first, second = (
-            sums + _PIXELS * _mean_of_all(sums, self.count) for sums in (self.count, self.first, self.second)
+            sums + _PIXELS * _mean_of_all(sums, self.pixels) for sums in (self.pixels, self.first, self.second)
         )
         mean = first / count[..., None]
         covariance = second / count[..., None, None] - mean[..., :, None] * mean[..., None, :] + _NOISE**2 * np.eye(3)
@@ -124,30 +120,22 @@ def slice_of(v: float, head: float, feet: float) -> int:
 
 @kernel
 def _add_colours(
-    edges: Ints,
-    first: Ints,
-    share: Singles,
-    corner: tuple[int, int],
-    rows: BodyRows,
-    place: Ints,
-    image: Bytes,
-    count: Floats,
-    sums: Floats,
-    products: Floats,
+    people: Patches, corner: tuple[int, int], rows: BodyRows, place: Ints, image: Bytes, sums: ColourSums
 ) -> None:
     """Add colours of pixels that are surely the person's."""
+    edges, share = people.edges, people.share
     for j in range(len(edges)):
-        i, t = first[j], place[j]
+        i, t = people.first[j], place[j]
         for v in range(edges[j, 1], edges[j, 3]):
             s = slice_of(v, rows.head[j], rows.feet[j])
             for u in range(edges[j, 0], edges[j, 2]):
                 if share[i] >= _VISIBLE_SHARE:
-                    count[t, s] += 1.0
+                    sums.pixels[t, s] += 1.0
                     for a in range(3):
                         colour = float(image[v - corner[1], u - corner[0], a])
-                        sums[t, s, a] += colour
+                        sums.first[t, s, a] += colour
                         for b in range(3):
-                            products[t, s, a, b] += colour * float(image[v - corner[1], u - corner[0], b])
+                            sums.second[t, s, a, b] += colour * float(image[v - corner[1], u - corner[0], b])
                 i += 1
 
 

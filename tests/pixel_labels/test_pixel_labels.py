@@ -317,9 +317,9 @@ def test_colours_are_learned_from_certain_pixels() -> None:
     sums = ColourSums.of(TRACKS)
     for _ in range(2000):
         sums.add(likelihood, rows, TRACKS, image)
-    assert sums.count.sum() == 2000 * sure.sum()
+    assert sums.pixels.sum() == 2000 * sure.sum()
     worn = sums.appearance()
-    for j, s in zip(*np.nonzero(sums.count), strict=True):
+    for j, s in zip(*np.nonzero(sums.pixels), strict=True):
         pixels = [
             image[v - 2, u - 3]
             for i, (v, u) in enumerate(product(range(2, 14), range((3, 5)[j], (6, 8)[j])))

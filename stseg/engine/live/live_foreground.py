@@ -14,7 +14,6 @@ import numpy as np
 from stseg.arrays import Bytes, Observation
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import BackgroundLearner, empty_background, is_colour, part_length, sampled
-from stseg.foreground.background.model import Background
 from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import FrameSet
@@ -112,10 +111,8 @@ class LiveForegrounds:
         for k, model in self._models.items():
             learned = self._learners[k].learned() if k in self._learners else model
             self._models[k] = learned
-            self._learners[k] = self._learner(self._empty.get(k, learned))
-
-    def _learner(self, model: Background) -> BackgroundLearner:
-        return BackgroundLearner(deepcopy(model), self._recording.rig.frame_rate, self._step, self._config.illumination)
+            model, illumination = deepcopy(self._empty.get(k, learned)), self._config.illumination
+            self._learners[k] = BackgroundLearner(model, self._recording.rig.frame_rate, self._step, illumination)
 
 
 def _image(view: Observation) -> list[Bytes]:

@@ -37,11 +37,7 @@ def commonest_colours(frames: NDArray[np.uint8], reach: float) -> tuple[Singles,
 
 @kernel
 def _gather(
-    frames: NDArray[np.uint8],
-    reach_squared: float,
-    companion: NDArray[np.bool_],
-    mean: Singles,
-    variance: Singles,
+    frames: NDArray[np.uint8], reach_squared: float, companion: NDArray[np.bool_], mean: Singles, variance: Singles
 ) -> None:
     count = len(frames)
     for v in range(frames.shape[1]):
