@@ -43,16 +43,12 @@ class SceneFilm:
         The scene.
     spoils
         Errors of masks and boxes, one after the other.
-
-    Attributes
-    ----------
-    rig
-        Its cameras and grid.
     """
 
     def __init__(self, spec: SceneSpec, spoils: Sequence[Spoil] = ()) -> None:
         self.spec, self.spoils = spec, tuple(spoils)
         self.rig: Rig = build_rig(spec)
+        """Its cameras and grid."""
         self.viewers = [Viewer(spec, *place) for place in zip(self.rig.cameras, turns(spec), strict=True)]
 
     @property

@@ -28,23 +28,15 @@ from stseg.records.tables import Tracks
 
 @dataclass(frozen=True)
 class CorrectedTracks:
-    """Tracks under answers.
-
-    Attributes
-    ----------
-    tracks
-    answered : ANSWER (n,)
-        What was answered so far.
-    new_ids
-        Corrected ids of labels by the run's id and frame, 0 where they are no person.
-    names
-        Names by corrected id.
-    """
+    """Tracks under answers."""
 
     tracks: Tracks
     answered: Rows
+    """ANSWER (n,): everything answered so far."""
     new_ids: Callable[[Ints, Ints], Ints]
+    """Corrected ids of labels by the run's id and frame, 0 where they are no person."""
     names: dict[int, str]
+    """Names by corrected id."""
 
 
 class CorrectedRun(NamedTuple):

@@ -90,7 +90,8 @@ def write_review(run_file: Path, output: Path, *, most: int, camera_images: bool
     run = read_run(run_file)
     run.require_fit()
     doubts = doubtful_decisions(run)[:most]
-    views = _frames(run, doubts) if camera_images and doubts else {}
+    frames = sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)})
+    views = read_views(run.recording, frames) if camera_images and doubts else {}
     questions = [_question(run, doubt, views) for doubt in doubts]
     write_page(output, review_page(f"{run.scene}: review", questions, camera_images), overwrite)
     return len(questions)
@@ -103,11 +104,6 @@ def _moments(run: Run, doubt: Doubt) -> tuple[tuple[str, int], ...]:
     if doubt.question == "false":
         before, after = doubt.first, doubt.last
     return ("before", before), ("during", (doubt.first + doubt.last) // 2), ("after", after)
-
-
-def _frames(run: Run, doubts: Sequence[Doubt]) -> Mapping[int, tuple[Observation, ...]]:
-    """Observations of the frames of all questions."""
-    return read_views(run.recording, sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)}))
 
 
 def _question(run: Run, doubt: Doubt, views: Mapping[int, tuple[Observation, ...]]) -> Question:

@@ -32,20 +32,13 @@ _OUTSIDE_SHARE = 0.5
 
 @dataclass(frozen=True)
 class SourceSummary:
-    """One camera's source.
-
-    Attributes
-    ----------
-    camera, source, grid
-        The camera, its source, and the ground.
-    detections
-        Those of the source; None where it delivers pixels.
-    """
+    """One camera's source."""
 
     camera: Camera
     source: CameraSource
     grid: Grid
     detections: SourceDetections | None
+    """Those of the source; None where it delivers pixels."""
 
     @cached_property
     def in_area(self) -> Flags:

@@ -27,7 +27,7 @@ from stseg.records.tables import BOX, EVENT
 from stseg.tracking.windows.encounters import encounters
 from stseg.trajectories.pruning import coincident, drop_ghosts, drop_short
 from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
-from stseg.trajectories.smoother import apart_from, fill_gaps, interpolated_rows, smooth_places
+from stseg.trajectories.smoother import fill_gaps, interpolated_rows, smooth_places
 
 _COINCIDENCE_TIME = 1.0
 """Time in one place from which two tracks are one person, seconds."""
@@ -65,7 +65,7 @@ def final_tracks(
     met = _encounters(events, _Names(committed, identity), frame_rate, config.tracking)
     renamed = _renamed(events, _Names(committed, named), linked.links)
     every_event = np.concatenate([renamed, met, repeated, dropped])
-    tracks = _without_gaps(bridged[np.isin(bridged["id"], kept) & ~repeats], frame_rate, config.tracking)
+    tracks = fill_gaps(bridged[np.isin(bridged["id"], kept) & ~repeats], frame_rate, config.tracking, True)
     smoothed = smooth_places(tracks, frame_rate, config.motion)
     whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
     least = config.tracking.return_probability
@@ -113,13 +113,6 @@ def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: T
     identity = np.where(np.isin(committed["id"], kept["id"]), committed["id"], 0)
     order = np.argsort(every_event["frame"], kind="stable")
     return FinalTracks(fill_gaps(kept, frame_rate, config), every_event[order], identity)
-
-
-def _without_gaps(tracks: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
-    """Tracks with the gaps filled that global association left, sorted by frame, then id."""
-    filled = apart_from(interpolated_rows(tracks, frame_rate, config), tracks)
-    rows = np.concatenate([tracks, filled])
-    return np.asarray(rows[np.lexsort((rows["id"], rows["frame"]))])
 
 
 def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:

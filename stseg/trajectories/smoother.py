@@ -22,10 +22,11 @@ _DRIFT_PER_FRAME = 0.1
 """Growth of a place's standard deviation a frame away from the nearest detection, metres."""
 
 
-def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
-    """The trajectory with its interpolated rows, sorted by frame, then id."""
-    rows = np.concatenate([trajectory, interpolated_rows(trajectory, frame_rate, config)])
-    return rows[np.lexsort((rows["id"], rows["frame"]))]
+def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig, keep_apart: bool = False) -> Rows:
+    """The trajectory with its interpolated rows, or those apart from all others, sorted by frame, then id."""
+    filled = interpolated_rows(trajectory, frame_rate, config)
+    rows = np.concatenate([trajectory, _apart_from(filled, trajectory) if keep_apart else filled])
+    return np.asarray(rows[np.lexsort((rows["id"], rows["frame"]))])
 
 
 def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
@@ -40,7 +41,7 @@ def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfi
     return np.concatenate([np.zeros(0, TRAJECTORY), *(_between(table[k], table[k + 1]) for k in gaps.tolist())])
 
 
-def apart_from(rows: Rows, trajectory: Rows) -> Rows:
+def _apart_from(rows: Rows, trajectory: Rows) -> Rows:
     """Rows apart from all rows of the trajectory in the same frame: two bodies need two places."""
     free = np.ones(len(rows), bool)
     by_frame = trajectory[np.argsort(trajectory["frame"], kind="stable")]

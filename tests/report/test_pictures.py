@@ -16,14 +16,13 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Boxes, Bytes, Rows
 from stseg.geometry import Camera, Grid, Rig
 from stseg.records.tables import TRAJECTORY
-from stseg.reporting import marginal_picture, overlay, plan_view, spacetime_picture, volume_picture
 from stseg.reporting.figures import backdrop
 from stseg.reporting.pictures.canvas import place_labels
 from stseg.reporting.pictures.colours import NIGHT, PAPER, track_colour
-from stseg.reporting.pictures.overlay import OverlayView, pillar_outline
-from stseg.reporting.pictures.plan import plan_map
-from stseg.reporting.pictures.slices import colours_of
-from stseg.reporting.pictures.spacetime import Block
+from stseg.reporting.pictures.overlay import OverlayView, overlay, pillar_outline
+from stseg.reporting.pictures.plan import plan_map, plan_view
+from stseg.reporting.pictures.slices import colours_of, marginal_picture, volume_picture
+from stseg.reporting.pictures.spacetime import Block, spacetime_picture
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 

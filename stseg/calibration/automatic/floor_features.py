@@ -102,7 +102,8 @@ def _shared(one: tuple[Floats, AnyArray], other: tuple[Floats, AnyArray]) -> Int
     if min(len(one[0]), len(other[0])) < _MIN_FEATURES:
         return np.zeros((0, 2), np.int64)
     away = np.linalg.norm(one[0][:, None] - other[0][None], axis=2)
-    unlike = np.where(away < _SEARCH_RADIUS, _distances(one[1], other[1]), np.inf)
+    square = (one[1] ** 2).sum(axis=1)[:, None] + (other[1] ** 2).sum(axis=1) - 2 * one[1] @ other[1].T
+    unlike = np.where(away < _SEARCH_RADIUS, np.asarray(np.sqrt(np.maximum(square, 0.0)), float), np.inf)
     best = unlike.argmin(axis=1)
     rows = np.arange(len(best))
     first = unlike[rows, best]
@@ -116,8 +117,3 @@ def _shared(one: tuple[Floats, AnyArray], other: tuple[Floats, AnyArray]) -> Int
     kept = np.zeros(len(rows), bool) if inlier is None else inlier.ravel() > 0
     pairs = np.stack([rows[kept], best[kept]], -1)
     return pairs if len(pairs) >= _MIN_FEATURES else np.zeros((0, 2), np.int64)
-
-
-def _distances(one: AnyArray, other: AnyArray) -> Floats:
-    square = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2 * one @ other.T
-    return np.asarray(np.sqrt(np.maximum(square, 0.0)), float)

@@ -73,8 +73,9 @@ class _RawDisagreement:
     view: int
     others: int
     confirmed: float
-    planes: _Planes
-    """Smoothed over the ground."""
+    middle: Floats
+    planes: Floats
+    """Smoothed over the ground: place (2,), metres; value there, slope along x and y of each column (3, column)."""
     field: Floats
     """float64 (n, 3): the same of each person: middle to the right, head and feet downwards, metres across the viewing
     ray."""
@@ -122,30 +123,29 @@ def _raw_disagreement(
         return None
     confirmed = float(people.has_box[inside, view].mean()) if inside.any() else 0.0
     ground = located.ground[measured]
-    planes = _smooth(ground, across[measured])
-    field = planes.at(ground)
+    middle, planes = _smooth(ground, across[measured])
+    field = _on_planes(ground, middle, planes)
     scatter = 1.4826 * float(np.nanmedian(np.abs(across[measured, 0] - field[:, 0])))
     slope = np.asarray(np.linalg.inv(ground_jacobian(camera, ground, _DIFFERENCE)), float)
     return _RawDisagreement(
-        view, len(others), confirmed, planes, field, scatter, pixel_height[measured] / located.height[measured], slope
+        view,
+        len(others),
+        confirmed,
+        middle,
+        planes,
+        field,
+        scatter,
+        pixel_height[measured] / located.height[measured],
+        slope,
     )
 
 
-@dataclass(frozen=True)
-class _Planes:
-    """Planes over the ground, one for each of several columns."""
-
-    middle: Floats
-    """float64 (2,): metres."""
-    found: Floats
-    """float64 (3, column): value at `middle`, slope along x, slope along y."""
-
-    def at(self, ground: Floats) -> Floats:
-        """Values at places (n, 2), float64 (n, column)."""
-        return np.asarray(np.column_stack([np.ones(len(ground)), ground - self.middle]) @ self.found)
+def _on_planes(ground: Floats, middle: Floats, planes: Floats) -> Floats:
+    """Values of planes at places (n, 2), float64 (n, column)."""
+    return np.asarray(np.column_stack([np.ones(len(ground)), ground - middle]) @ planes)
 
 
-def _smooth(ground: Floats, across: Floats) -> _Planes:
+def _smooth(ground: Floats, across: Floats) -> tuple[Floats, Floats]:
     """Least absolute deviations planes (by reweighting) of middles, heads and feet (n, 3), nan where unknown."""
     middle = np.median(ground, axis=0)
     basis = np.column_stack([np.ones(len(ground)), ground - middle])
@@ -161,7 +161,7 @@ def _smooth(ground: Floats, across: Floats) -> _Planes:
             rest = value - rows @ found[:, column]
             hidden = _OCCLUSION_WEIGHT if column == _FEET_COLUMN else 1.0
             weight = np.where(rest < 0, hidden, 1.0) / np.maximum(np.abs(rest), 0.01)
-    return _Planes(middle, found)
+    return middle, found
 
 
 def _size(moves: Floats) -> float:
@@ -241,7 +241,7 @@ def _corrected(people: BoxCorrespondences, table: BodyTable, raw: _RawDisagreeme
         return people
     body = table.boxes_of(people.ground, people.height)
     scale = (body[:, 3] - body[:, 1]) / people.height
-    right, head, feet = (raw.planes.at(people.ground) * scale[:, None]).T
+    right, head, feet = (_on_planes(people.ground, raw.middle, raw.planes) * scale[:, None]).T
     box = people.box.copy()
     box[:, raw.view] -= np.stack([right, head, right, feet], -1)
     return replace(people, box=box)

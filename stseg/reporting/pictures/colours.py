@@ -46,7 +46,8 @@ def track_colour(identity: int) -> Colour:
     lightness = _LIGHTNESS[identity % 3]
     hue = _HUE_OF_ZERO + identity * _GOLDEN_ANGLE
     for chroma in np.linspace(_CHROMA, 0.0, 20):
-        linear = _linear_rgb(lightness, float(chroma), hue)
+        oklab = np.array([lightness, float(chroma) * np.cos(hue), float(chroma) * np.sin(hue)])
+        linear = np.asarray(_RGB_OF_LMS @ (_LMS_OF_OKLAB @ oklab) ** 3)
         if linear.min() >= 0 and linear.max() <= 1:  # the screen can show it
             break
     red, green, blue = np.rint(255 * _gamma(linear)).astype(int).tolist()
@@ -68,11 +69,6 @@ def mixed(colour: Colour, other: Colour, share: float) -> Colour:
     """`colour` with a share 0..1 of `other`."""
     blue, green, red = (round(a + (b - a) * share) for a, b in zip(colour, other, strict=True))
     return blue, green, red
-
-
-def _linear_rgb(lightness: float, chroma: float, hue: float) -> Floats:
-    oklab = np.array([lightness, chroma * np.cos(hue), chroma * np.sin(hue)])
-    return np.asarray(_RGB_OF_LMS @ (_LMS_OF_OKLAB @ oklab) ** 3)
 
 
 def _gamma(linear: Floats) -> Floats:
