@@ -31,22 +31,11 @@ def require_label_folder(folder: Path, overwrite: bool) -> None:
 
 
 class LabelImages:
-    """A folder of label images, one folder a camera in it.
+    """A folder of label images, made if it does not exist, with one folder a camera in it.
 
-    OutputError where the folder holds something already, cannot be written to, or an id is too large.
-
-    Parameters
-    ----------
-    folder
-        The folder; made if it does not exist.
-    cameras
-        Names of the cameras that will have images.
-    largest
-        The largest id.
-    palette : uint8 (256, 3)
-        Red, green, blue of each id.
-    overwrite
-        Write into a folder that is not empty; older label images of these cameras are deleted.
+    `largest` is the largest id, `palette` uint8 (256, 3) the red, green, blue of each id. With `overwrite` the folder
+    need not be empty; older label images of these cameras are deleted. OutputError where the folder holds something
+    already, cannot be written to, or an id is too large.
     """
 
     def __init__(self, folder: Path, cameras: Sequence[str], largest: int, palette: Bytes, overwrite: bool) -> None:

@@ -85,22 +85,11 @@ def write_scene(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> None:
-    """Film a scene into a folder. OutputError where the folder holds something already, or cannot be written to.
+    """Film a scene into a folder, which is made if it does not exist.
 
-    Parameters
-    ----------
-    folder
-        The folder; made if it does not exist.
-    scene
-        What to film.
-    body
-        What the rig files say of the bodies.
-    instances
-        Also write instance images, one file a camera and frame.
-    overwrite
-        Write into a folder that is not empty, over files of the same name.
-    progress
-        Called after each frame.
+    `body` is what the rig files say of the bodies. With `instances` there are instance images, too, one file a camera
+    and frame; with `overwrite` the folder need not be empty, and files of the same name are replaced. `progress` is
+    called after each frame. OutputError where the folder holds something already, or cannot be written to.
     """
     require_utf8(folder, "a video")
     with _as_output_error(folder):

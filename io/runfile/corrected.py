@@ -29,30 +29,11 @@ def write_corrected(
     run: Path, path: Path, tracks: Tracks, answers: Rows, new_ids: NewIds, names: Mapping[int, str], text: str,
     overwrite: bool,
 ) -> None:  # fmt: skip
-    """Copy a run file with other tracks; evidence (log_odds, ghosts, rates) is copied unchanged.
+    """Copy a run file to a path with other tracks; evidence (log_odds, ghosts, rates) is copied unchanged.
 
-    Parameters
-    ----------
-    run, path
-        The run file, and the one to write.
-    tracks
-        The corrected tracks.
-    answers : ANSWER (n,)
-        The answers so far.
-    new_ids
-        Ids of the labels.
-    names
-        Names by corrected id, kept in the provenance.
-    text
-        Text of the answers, kept in the provenance.
-    overwrite
-        Whether an older file may be replaced.
-
-    Raises
-    ------
-    OutputError
-    FormatError
-        Where a table cannot be resized, or labels are no ids.
+    `answers` are the ANSWER rows (n,) so far, `new_ids` gives the ids of the labels. The provenance keeps `names` by
+    corrected id and the text of the answers. OutputError where it cannot be written; FormatError where a table cannot
+    be resized, or labels are no ids.
     """
     with replacing(path, overwrite) as part:
         shutil.copyfile(run, part)
