@@ -177,11 +177,11 @@ def _table(config: LabelConfig) -> Labels:
 
 def _neighbours(node: Ints, nodes: int, across: Labels, down: Labels) -> tuple[Ints, Ints, Ints, Ints]:
     """Edges between nodes: start, end and weight, int64 (edge,); and each node's weights to other pixels, (node,)."""
-    beside = np.full((*node.shape, 2), -1, np.int64)
-    beside[:, :-1, 0], beside[:-1, :, 1] = node[:, 1:], node[1:]
-    weight, own = np.stack([across, down], -1).astype(np.int64), np.broadcast_to(node[..., None], beside.shape)
-    joined, border = (own >= 0) & (beside >= 0) & (weight > 0), np.zeros(nodes, np.int64)
-    for one, other in ((own, beside), (beside, own)):
+    neighbour = np.full((*node.shape, 2), -1, np.int64)
+    neighbour[:, :-1, 0], neighbour[:-1, :, 1] = node[:, 1:], node[1:]
+    weight, pixel = np.stack([across, down], -1).astype(np.int64), np.broadcast_to(node[..., None], neighbour.shape)
+    joined, border = (pixel >= 0) & (neighbour >= 0) & (weight > 0), np.zeros(nodes, np.int64)
+    for one, other in ((pixel, neighbour), (neighbour, pixel)):
         outside = (one >= 0) & (other < 0)
         np.add.at(border, one[outside], weight[outside])
-    return own[joined], beside[joined], weight[joined], border
+    return pixel[joined], neighbour[joined], weight[joined], border
