@@ -12,6 +12,30 @@ from stseg.arrays import Boxes, Bytes, Floats, Singles
 from stseg.config import BackgroundConfig, ChromaticConfig, CodebookConfig, MixtureConfig
 
 UNIFORM = 256.0**-3
+GaussianConfig = MixtureConfig | ChromaticConfig
+FLOOR, SHIRT = (110, 140, 60), (40, 60, 190)
+"""Colours of an empty scene and of a person, BGR."""
+
+
+def noisy(image: Bytes, rng: np.random.Generator, sd: float = 2.0) -> Bytes:
+    """The image with noise."""
+    return np.asarray(np.clip(np.round(image + rng.normal(0, sd, image.shape)), 0, 255), np.uint8)
+
+
+def random_modes(rng: np.random.Generator, modes: int, config: GaussianConfig) -> tuple[Singles, Singles, Singles]:
+    """Means, variances and weights of random modes of 3 x 4 pixels."""
+    shape = (3, 4, modes, 2) if isinstance(config, ChromaticConfig) else (3, 4, modes)
+    mean = rng.uniform(5, 250, (3, 4, modes, 3)).astype(np.float32)
+    variance = rng.uniform(6 if isinstance(config, ChromaticConfig) else 16, 400, shape).astype(np.float32)
+    weight = rng.dirichlet(np.full(modes, 0.4), (3, 4)).astype(np.float32)
+    return mean, variance, weight
+
+
+def near_modes(rng: np.random.Generator, mean: Singles) -> Bytes:
+    """Colours around the modes, in their light, in their shadow, and elsewhere."""
+    ratio = rng.choice([1.2, 1.0, 0.8, 0.55, 0.3], mean.shape[:2])
+    colours = mean[:, :, 0] * ratio[:, :, None] + rng.normal(0, 6, (*mean.shape[:2], 3))
+    return np.asarray(np.clip(np.round(colours), 0, 255), np.uint8)
 
 
 def planes_of(mean: Singles, variance: Singles, weight: Singles) -> Singles:
@@ -38,58 +62,12 @@ def mode_densities(x: Floats, mu: Floats, var: float, darkest: float) -> tuple[f
     return lit, along * math.exp(-(residual @ residual) / (2 * var)) / (2 * math.pi * var)
 
 
-def log_odds(
-    image: Bytes, gain: Floats, mean: Singles, variance: Singles, weight: Singles, config: MixtureConfig
-) -> Floats:
-    """Log-odds of foreground (v, u), within 5 nats."""
-    out = np.empty(image.shape[:2])
-    for v, u in np.ndindex(*out.shape):
-        lit, dimmed = 0.0, 0.0
-        for k in np.flatnonzero(weight[v, u] >= config.background_weight):
-            mu = np.minimum(gain * mean[v, u, k].astype(float), 255.0)
-            n, d = mode_densities(image[v, u].astype(float), mu, float(variance[v, u, k]), config.darkest_shadow)
-            lit, dimmed = lit + float(weight[v, u, k]) * n, dimmed + float(weight[v, u, k]) * d
-        out[v, u] = posterior((1 - config.shadow_prior) * lit + config.shadow_prior * dimmed, dimmed, config)
-    return out
-
-
 def posterior(explained: float, dimmed: float, config: BackgroundConfig) -> float:
     """Log-odds of a person, within 5 nats."""
     scene = (1 - config.outlier_rate) * explained + config.outlier_rate * UNIFORM
     person = (1 - config.shadow_confusion) * UNIFORM + config.shadow_confusion * dimmed
     odds = config.foreground_prior * person / ((1 - config.foreground_prior) * scene)
     return float(np.clip(math.log(odds), -5, 5))
-
-
-def updated(
-    image: Bytes,
-    gain: Floats,
-    likelihood: Singles,
-    fast: float,
-    slow: float,
-    state: tuple[Singles, Singles, Singles],
-    config: MixtureConfig,
-) -> tuple[Floats, Floats, Floats]:
-    """Mean, variance and weight after a frame."""
-    mean, variance, weight = (part.astype(float) for part in state)
-    for v, u in np.ndindex(*image.shape[:2]):
-        x, w = image[v, u].astype(float), weight[v, u]
-        residual = x - np.minimum(gain * mean[v, u], 255.0)
-        mahalanobis = np.where(w > 0, (residual**2).sum(-1) / variance[v, u], np.inf)
-        k = int(mahalanobis.argmin())
-        if mahalanobis[k] <= config.match_distance**2:
-            rate = slow if w[k] < config.background_weight else slow * likelihood[v, u] + fast * (1 - likelihood[v, u])
-            w *= 1 - rate
-            w[k] += rate
-            step = min(rate / w[k], 1)
-            mean[v, u, k] += step * residual[k] / gain
-            variance[v, u, k] += step * ((residual[k] ** 2).mean() - variance[v, u, k])
-            variance[v, u, k] = max(variance[v, u, k], config.minimum_sd**2)
-        elif likelihood[v, u] >= 0.5 and w.min() < config.background_weight:
-            k = int(w.argmin())
-            w *= 1 - slow
-            w[k], variance[v, u, k], mean[v, u, k] = slow, config.initial_sd**2, x / gain
-    return mean, variance, weight
 
 
 def polar(x: Floats, mu: Floats) -> tuple[float, float, float]:
@@ -113,40 +91,46 @@ def chromatic_densities(x: Floats, mu: Floats, across: float, along: float, dark
     return lit, disc * 2 * t * gaussian(max(ratio - 1, 0) * length, along) / line
 
 
-def chromatic_log_odds(
-    image: Bytes, gain: Floats, mean: Singles, variance: Singles, weight: Singles, config: ChromaticConfig
+def log_odds(
+    image: Bytes, gain: Floats, mean: Singles, variance: Singles, weight: Singles, config: GaussianConfig
 ) -> Floats:
-    """Log-odds of foreground (v, u), within 5 nats."""
+    """Log-odds of foreground (v, u), within 5 nats, of either mixture."""
     out = np.empty(image.shape[:2])
     for v, u in np.ndindex(*out.shape):
         lit, dimmed = 0.0, 0.0
         for k in np.flatnonzero(weight[v, u] >= config.background_weight):
-            mu = np.minimum(gain * mean[v, u, k].astype(float), 255.0)
-            across, along = variance[v, u, k].astype(float)
-            n, d = chromatic_densities(image[v, u].astype(float), mu, across, along, config.darkest_shadow)
+            x, mu = image[v, u].astype(float), np.minimum(gain * mean[v, u, k].astype(float), 255.0)
+            if isinstance(config, ChromaticConfig):
+                n, d = chromatic_densities(x, mu, *variance[v, u, k].astype(float), config.darkest_shadow)
+            else:
+                n, d = mode_densities(x, mu, float(variance[v, u, k]), config.darkest_shadow)
             lit, dimmed = lit + float(weight[v, u, k]) * n, dimmed + float(weight[v, u, k]) * d
         out[v, u] = posterior((1 - config.shadow_prior) * lit + config.shadow_prior * dimmed, dimmed, config)
     return out
 
 
-def chromatic_updated(
-    image: Bytes,
-    gain: Floats,
-    likelihood: Singles,
-    fast: float,
-    slow: float,
-    state: tuple[Singles, Singles, Singles],
-    config: ChromaticConfig,
-) -> tuple[Floats, Floats, Floats]:
-    """Mean, variance and weight after a frame."""
+def squares_of(x: Floats, means: Floats, config: GaussianConfig) -> Floats:
+    """Squared residuals from each mode (mode, variance): of all channels, or across and along the ray of its mean."""
+    if not isinstance(config, ChromaticConfig):
+        return np.asarray(((x - means) ** 2).sum(-1, keepdims=True))
+    parts = [polar(x, mu) for mu in means]
+    return np.array([(off**2, ((ratio - 1) * length) ** 2) for ratio, off, length in parts])
+
+
+def updated(
+    image: Bytes, gain: Floats, likelihood: Singles, fast: float, slow: float,
+    state: tuple[Singles, Singles, Singles], config: GaussianConfig,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Mean, variance and weight after a frame, of either mixture."""
     mean, variance, weight = (part.astype(float) for part in state)
-    least = np.array([config.chromatic_sd**2, config.minimum_sd**2])
+    variance = variance.reshape(*weight.shape, -1)  # one for all channels, or one across and one along
+    chromatic = isinstance(config, ChromaticConfig)
+    least = np.array([config.chromatic_sd**2, config.minimum_sd**2] if chromatic else [config.minimum_sd**2])
+    freedom = np.array([2, 1] if chromatic else [3])
     for v, u in np.ndindex(*image.shape[:2]):
         x, w = image[v, u].astype(float), weight[v, u]
-        squares = np.empty((len(w), 2))
-        for k, mu in enumerate(np.minimum(gain * mean[v, u], 255.0)):
-            ratio, off, length = polar(x, mu)
-            squares[k] = off**2, ((ratio - 1) * length) ** 2
+        shown = np.minimum(gain * mean[v, u], 255.0)
+        squares = squares_of(x, shown, config)
         mahalanobis = np.where(w > 0, (squares / variance[v, u]).sum(-1), np.inf)
         k = int(mahalanobis.argmin())
         if mahalanobis[k] <= config.match_distance**2:
@@ -154,14 +138,14 @@ def chromatic_updated(
             w *= 1 - rate
             w[k] += rate
             step = min(rate / w[k], 1)
-            mean[v, u, k] += step * (x - np.minimum(gain * mean[v, u, k], 255.0)) / gain
-            variance[v, u, k] += step * (squares[k] / (2, 1) - variance[v, u, k])
+            mean[v, u, k] += step * (x - shown[k]) / gain
+            variance[v, u, k] += step * (squares[k] / freedom - variance[v, u, k])
             variance[v, u, k] = np.maximum(variance[v, u, k], least)
         elif likelihood[v, u] >= 0.5 and w.min() < config.background_weight:
             k = int(w.argmin())
             w *= 1 - slow
             w[k], variance[v, u, k], mean[v, u, k] = slow, config.initial_sd**2, x / gain
-    return mean, variance, weight
+    return mean, variance.reshape(state[1].shape), weight
 
 
 def codeword_densities(

@@ -12,21 +12,20 @@ import reference_foreground as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from reference_foreground import FLOOR, SHIRT, near_modes, noisy
 
-from stseg.arrays import Bytes, Singles
+from stseg.arrays import Bytes
 from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
 from stseg.errors import ConfigError, SourceError
 from stseg.foreground import MODELS as MODELS_BY_NAME
 from stseg.foreground import Chromatic, Codebook, Mixture, make_background
-from stseg.foreground.background import codebook_kernels, gaussian_kernels
+from stseg.foreground.background import codebook_kernels
 from stseg.foreground.background.codebook import forget_rare_words
 from stseg.foreground.background.codebook_kernels import Codewords
 from stseg.foreground.background.model import Background
 from stseg.foreground.background.posterior import Priors
 from stseg.kernels.accelerate import python_form
 
-FLOOR = (110, 140, 60)  # BGR
-SHIRT = (40, 60, 190)
 SIZE = (7, 6)
 MIDDLE = (3, 3)  # (v, u) of somebody who covers the pixels 2..4 x 2..4
 RATE = 4.0  # frames per second
@@ -48,10 +47,6 @@ def with_person(image: Bytes, colour: tuple[float, float, float] = SHIRT) -> Byt
     occupied = image.copy()
     occupied[2:5, 2:5] = np.round(colour)
     return occupied
-
-
-def noisy(image: Bytes, rng: np.random.Generator, sd: float = 2.0) -> Bytes:
-    return np.asarray(np.clip(np.round(image + rng.normal(0, sd, image.shape)), 0, 255), np.uint8)
 
 
 def taught(kind: type[Background], **constants: float) -> Background:
@@ -277,51 +272,6 @@ def test_a_dark_pixel_has_no_chromaticity_to_speak_of() -> None:
     for _ in range(20):
         dark.learn(room((7, 9, 4)))
     assert dark.likelihood(with_person(room((7, 9, 4)), (5, 6, 7)))[MIDDLE] < 0.1
-
-
-def random_modes(rng: np.random.Generator, modes: int) -> tuple[Singles, Singles, Singles]:
-    mean = rng.uniform(5, 250, (3, 4, modes, 3)).astype(np.float32)
-    variance = rng.uniform(6, 400, (3, 4, modes, 2)).astype(np.float32)
-    weight = rng.dirichlet(np.full(modes, 0.4), (3, 4)).astype(np.float32)
-    return mean, variance, weight
-
-
-def near_modes(rng: np.random.Generator, mean: Singles) -> Bytes:
-    """Colours around the modes, in their light, in their shadow, and elsewhere."""
-    ratio = rng.choice([1.2, 1.0, 0.8, 0.55, 0.3], mean.shape[:2])
-    own = mean[:, :, 0] * ratio[:, :, None] + rng.normal(0, 6, (*mean.shape[:2], 3))
-    return np.asarray(np.clip(np.round(own), 0, 255), np.uint8)
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10**6), modes=st.integers(1, 3))
-def test_the_chromatic_log_odds_are_their_formula(seed: int, modes: int) -> None:
-    rng = np.random.default_rng(seed)
-    state, config = random_modes(rng, modes), ChromaticConfig()
-    image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3)
-    expected = reference.chromatic_log_odds(image, gain, *state, config)
-    log_odds = np.empty(image.shape[:2], np.float32)
-    for function in (gaussian_kernels.fill_mixture_log_odds, python_form(gaussian_kernels.fill_mixture_log_odds)):
-        state_of_modes, weight = reference.planes_of(*state), config.background_weight
-        function(image, gain.astype(np.float32), state_of_modes, weight, Priors.of(config), log_odds)
-        np.testing.assert_allclose(log_odds, expected, atol=2e-3)
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10**6), modes=st.integers(1, 3))
-def test_the_chromatic_modes_learn_by_their_rules(seed: int, modes: int) -> None:
-    rng = np.random.default_rng(seed)
-    state, config = random_modes(rng, modes), ChromaticConfig()
-    image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
-    likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
-    expected = reference.chromatic_updated(image, gain.astype(float), likelihood, 0.05, 0.001, state, config)
-    numbers = config.background_weight, config.match_distance, config.initial_sd, config.chromatic_sd, config.minimum_sd
-    constants = gaussian_kernels.Adaptation(*(np.float32(number) for number in numbers))
-    for function in (gaussian_kernels.adapt_mixture, python_form(gaussian_kernels.adapt_mixture)):
-        found = reference.planes_of(*state)
-        function(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
-        for one, other in zip(reference.modes_of(found), expected, strict=True):
-            np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-3)
 
 
 # The codebook
