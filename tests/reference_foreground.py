@@ -101,7 +101,8 @@ def log_odds(
         for k in np.flatnonzero(weight[v, u] >= config.background_weight):
             x, mu = image[v, u].astype(float), np.minimum(gain * mean[v, u, k].astype(float), 255.0)
             if isinstance(config, ChromaticConfig):
-                n, d = chromatic_densities(x, mu, *variance[v, u, k].astype(float), config.darkest_shadow)
+                across, along = variance[v, u, k].astype(float)
+                n, d = chromatic_densities(x, mu, across, along, config.darkest_shadow)
             else:
                 n, d = mode_densities(x, mu, float(variance[v, u, k]), config.darkest_shadow)
             lit, dimmed = lit + float(weight[v, u, k]) * n, dimmed + float(weight[v, u, k]) * d
@@ -124,9 +125,9 @@ def updated(
     """Mean, variance and weight after a frame, of either mixture."""
     mean, variance, weight = (part.astype(float) for part in state)
     variance = variance.reshape(*weight.shape, -1)  # one for all channels, or one across and one along
-    chromatic = isinstance(config, ChromaticConfig)
-    least = np.array([config.chromatic_sd**2, config.minimum_sd**2] if chromatic else [config.minimum_sd**2])
-    freedom = np.array([2, 1] if chromatic else [3])
+    least, freedom = np.array([config.minimum_sd**2]), np.array([3])
+    if isinstance(config, ChromaticConfig):
+        least, freedom = np.array([config.chromatic_sd**2, config.minimum_sd**2]), np.array([2, 1])
     for v, u in np.ndindex(*image.shape[:2]):
         x, w = image[v, u].astype(float), weight[v, u]
         shown = np.minimum(gain * mean[v, u], 255.0)

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 import pytest
 import run_files
-from recordings import FRAMES, OPTIONS, assert_same, compiled_only, track, write_recording
+from recordings import FRAMES, OPTIONS, assert_same, compiled_only, track
 from run_files import write_small_run
 from scenes import box_frame_sets, corner_cameras, rig_of, walkers
 
@@ -28,11 +28,6 @@ from stseg.kernels.accelerate import COMPILED
 from stseg.tasks.forecast import Forecast
 
 RIG = rig_of(corner_cameras())
-
-
-@pytest.fixture(scope="module")
-def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_recording(tmp_path_factory.mktemp("recording"))
 
 
 @compiled_only

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import ALONE, ENVIRONMENT, FRAMES, OPTIONS, assert_same, compiled_only, track, write_recording
+from recordings import ALONE, ENVIRONMENT, FRAMES, OPTIONS, assert_same, compiled_only, track
 from scenes import walkers
 
 from stseg.evaluation import evaluate
@@ -31,18 +31,6 @@ sys.exit(main())
 """
 """A run on a slow disk, that it is still at work when a signal reaches it on a machine of any speed."""
 pytestmark = compiled_only
-
-
-@pytest.fixture(scope="module")
-def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_recording(tmp_path_factory.mktemp("recording"))
-
-
-@pytest.fixture(scope="module")
-def undisturbed(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("undisturbed") / "run.h5"
-    assert track(rig_path, path) == 0
-    return path
 
 
 @pytest.fixture

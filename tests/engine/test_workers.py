@@ -24,32 +24,19 @@ from stseg.engine.workers.worker_processes import processes_that_fit
 pytestmark = compiled_only
 
 
-@pytest.fixture(scope="module")
-def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_recording(tmp_path_factory.mktemp("recording"))
-
-
-@pytest.fixture(scope="module")
-def alone(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What one process makes."""
-    path = tmp_path_factory.mktemp("alone") / "run.h5"
-    assert track(rig_path, path) == 0
-    return path
-
-
 @pytest.fixture(autouse=True)
 def path_for_children(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
 
 
 @pytest.mark.parametrize("workers", [2, 4])
-def test_any_number_of_workers_makes_the_same(rig_path: Path, alone: Path, tmp_path: Path, workers: int) -> None:
+def test_any_number_of_workers_makes_the_same(rig_path: Path, undisturbed: Path, tmp_path: Path, workers: int) -> None:
     assert track(rig_path, tmp_path / "run.h5", "--workers", str(workers)) == 0
-    assert_same(tmp_path / "run.h5", alone)
+    assert_same(tmp_path / "run.h5", undisturbed)
     assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
 
 
-def test_a_worker_that_is_killed_is_replaced(rig_path: Path, alone: Path, tmp_path: Path) -> None:
+def test_a_worker_that_is_killed_is_replaced(rig_path: Path, undisturbed: Path, tmp_path: Path) -> None:
     over = threading.Event()
     killed: list[BaseProcess] = []
 
@@ -67,7 +54,7 @@ def test_a_worker_that_is_killed_is_replaced(rig_path: Path, alone: Path, tmp_pa
         over.set()
         killer.join()
     assert len(killed) == 1
-    assert_same(tmp_path / "run.h5", alone)
+    assert_same(tmp_path / "run.h5", undisturbed)
 
 
 def test_what_a_worker_finds_wrong_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -135,7 +122,7 @@ def _cluster_worker(address: str, folder: Path) -> subprocess.Popen[bytes]:
 
 
 def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
-    rig_path: Path, alone: Path, tmp_path: Path, cluster: Cluster
+    rig_path: Path, undisturbed: Path, tmp_path: Path, cluster: Cluster
 ) -> None:
     output = tmp_path / "run.h5"
     folder = tmp_path / "run.h5.segments"
@@ -155,7 +142,7 @@ def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
         killer.join()
     assert cluster.workers[0].wait() == -signal.SIGKILL
     assert cluster.workers[1].poll() is None
-    assert_same(output, alone)
+    assert_same(output, undisturbed)
 
 
 def test_a_scheduler_that_is_not_there(rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

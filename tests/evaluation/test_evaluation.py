@@ -17,7 +17,7 @@ import reference_evaluation as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stseg.arrays import Rows
+from stseg.arrays import Flags, Ints, Rows
 from stseg.commands.evaluate import evaluate as command
 from stseg.errors import ConfigError, FormatError
 from stseg.evaluation import evaluate
@@ -36,6 +36,13 @@ def table(rows: Iterable[tuple[int, int, float, float] | tuple[int, int, float, 
 def walk(identity: int, y: float, frames: Iterable[int]) -> list[tuple[int, int, float, float]]:
     """A person that walks along x at 0.1 m a frame."""
     return [(frame, identity, 0.1 * frame, y) for frame in frames]
+
+
+def with_ids(rows: Rows, where: Flags, ids: Ints | int) -> Rows:
+    """The rows with other ids in some of them."""
+    renamed = rows.copy()
+    renamed["id"] = np.where(where, ids, rows["id"])
+    return renamed
 
 
 TEN = range(10)
@@ -77,46 +84,37 @@ def test_perfect_tracks_score_full_marks_whatever_their_names() -> None:
     assert (scores.motp, scores.location_mean, scores.location_median) == (0, 0, 0)
 
 
-def test_a_tracker_silent_half_the_time_has_missed_half() -> None:
-    scores = evaluate(TWO, TWO[TWO["frame"] < 5])
-    assert (scores.frames, scores.moda, scores.recall, scores.mota) == (10, 50, 50, 50)
-    assert (scores.precision, scores.modp) == (100, 100)
-    assert scores.idf1 == pytest.approx(200 / 3)
-    assert scores.mostly_tracked == 0
+GAP = TWO[(TWO["id"] == 2) | ~np.isin(TWO["frame"], [4, 5])]
+"""The first is missed in two frames."""
+HALVES = table(walk(1, 0.0, range(5)) + walk(1, 5.0, range(5, 10)) + walk(2, 2.0, TEN))
+SCENES: dict[str, tuple[Rows, dict[str, float]]] = {
+    "silent half the time": (
+        TWO[TWO["frame"] < 5],
+        {"frames": 10, "moda": 50, "recall": 50, "mota": 50, "precision": 100, "modp": 100, "idf1": 200 / 3,
+         "mostly_tracked": 0},
+    ),
+    "swapped names": (  # every pair shares 5 of 15 frames
+        with_ids(TWO, TWO["frame"] >= 5, 3 - TWO["id"]),
+        {"moda": 100, "switches": 2, "fragments": 0, "mota": 90, "idf1": 50, "hota": 100 * np.sqrt(1 / 3)},
+    ),
+    "a gap under one name": (GAP, {"fragments": 1, "switches": 0, "misses": 2, "mostly_tracked": 1}),
+    "a new name after a gap": (
+        with_ids(GAP, (GAP["id"] == 1) & (GAP["frame"] > 5), 8), {"fragments": 1, "switches": 1},
+    ),
+    "a false track": (
+        np.concatenate([TWO, table(walk(9, 5.0, range(4)))]),
+        {"false_alarms": 4, "false_tracks": 1, "false_track_frames": 4, "moda": 80, "recall": 100,
+         "precision": 100 * 20 / 24},
+    ),
+    "matched in just half of its frames": (HALVES, {"false_tracks": 1}),
+}  # fmt: skip
 
 
-def test_swapped_names_cost_two_switches_and_half_the_identity() -> None:
-    tracks = TWO.copy()
-    late = tracks["frame"] >= 5
-    tracks["id"][late] = 3 - tracks["id"][late]
+@pytest.mark.parametrize("scene", SCENES)
+def test_scores_of_named_scenes(scene: str) -> None:
+    tracks, expected = SCENES[scene]
     scores = evaluate(TWO, tracks)
-    assert (scores.moda, scores.switches, scores.fragments) == (100, 2, 0)
-    assert (scores.mota, scores.idf1) == (90, 50)
-    assert scores.hota == pytest.approx(100 * np.sqrt(1 / 3))  # every pair shares 5 of 15 frames
-
-
-def test_a_gap_under_one_name_is_a_fragment_and_no_switch() -> None:
-    scores = evaluate(TWO, TWO[(TWO["id"] == 2) | ~np.isin(TWO["frame"], [4, 5])])
-    assert (scores.fragments, scores.switches, scores.misses, scores.mostly_tracked) == (1, 0, 2, 1)
-
-
-def test_a_new_name_after_a_gap_is_a_fragment_and_a_switch() -> None:
-    tracks = TWO[(TWO["id"] == 2) | ~np.isin(TWO["frame"], [4, 5])].copy()
-    tracks["id"][(tracks["id"] == 1) & (tracks["frame"] > 5)] = 8
-    scores = evaluate(TWO, tracks)
-    assert (scores.fragments, scores.switches) == (1, 1)
-
-
-def test_a_false_track_costs_detections_and_counts_its_length() -> None:
-    scores = evaluate(TWO, np.concatenate([TWO, table(walk(9, 5.0, range(4)))]))
-    assert (scores.false_alarms, scores.false_tracks, scores.false_track_frames) == (4, 1, 4)
-    assert (scores.moda, scores.recall) == (80, 100)
-    assert scores.precision == pytest.approx(100 * 20 / 24)
-
-
-def test_a_track_matched_in_just_half_of_its_frames_is_false() -> None:
-    tracks = table(walk(1, 0.0, range(5)) + walk(1, 5.0, range(5, 10)) + walk(2, 2.0, TEN))
-    assert evaluate(TWO, tracks).false_tracks == 1
+    assert {name: getattr(scores, name) for name in expected} == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("found", "lost", "tracked"), [(1, 1, 1), (2, 0, 1), (8, 0, 1), (9, 0, 2)])
@@ -178,13 +176,8 @@ def test_frames_without_truth_count_where_asked_for() -> None:
 def test_scores_without_a_denominator_are_none() -> None:
     no_truth, no_tracks = evaluate(TWO[:0], TWO), evaluate(TWO, TWO[:0])
     assert (no_truth.frames, no_truth.moda, no_truth.mota, no_truth.recall) == (0, None, None, None)
-    assert (no_tracks.moda, no_tracks.precision, no_tracks.location_mean, no_tracks.hota, no_tracks.idf1) == (
-        0,
-        None,
-        None,
-        0,
-        0,
-    )
+    figures = [no_tracks.moda, no_tracks.precision, no_tracks.location_mean, no_tracks.hota, no_tracks.idf1]
+    assert figures == [0, None, None, 0, 0]
     assert no_tracks.mostly_lost == 2
 
 

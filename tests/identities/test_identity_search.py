@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import track, write_recording
 from reference_identities import crossings, greatest_score, score
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
 
@@ -288,19 +287,17 @@ def test_who_is_no_person_binds_nothing() -> None:
 # The command
 
 
-def test_a_run_is_solved_again(tmp_path: Path) -> None:
+def test_a_run_is_solved_again(undisturbed: Path, tmp_path: Path) -> None:
     """Without answers nothing changes; a swap exchanges tracks and labels, and names follow; the rest stays."""
-    run_file = tmp_path / "run.h5"
-    assert track(write_recording(tmp_path), run_file) == 0
-    run = read_run(run_file)
+    run = read_run(undisturbed)
     assert len(run.committed) >= len(run.trajectory) - 5
     (tmp_path / "a.csv").write_text("action,frame,id,other,name\nkeep,20,1,,\n")
-    correct(run_file, tmp_path / "a.csv", output=tmp_path / "same.h5")
+    correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "same.h5")
     same = read_run(tmp_path / "same.h5")
     for name in ("trajectory", "tracks", "boxes"):
         np.testing.assert_array_equal(getattr(same, name), getattr(run, name))
     (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\nname,,2,,Bo\ndelete,,3,,\n")
-    correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "new.h5")
     new = read_run(tmp_path / "new.h5")
     assert set(new.tracks["id"].tolist()) == {1, 2}
     assert new.names == {2: "Bo"}
@@ -318,16 +315,15 @@ def test_a_run_is_solved_again(tmp_path: Path) -> None:
     np.testing.assert_array_equal(new.read_frame(20)[0], run.read_frame(20)[0])
 
 
-def test_a_second_correction_keeps_earlier_answers(tmp_path: Path) -> None:
+def test_a_second_correction_keeps_earlier_answers(undisturbed: Path, tmp_path: Path) -> None:
     """Two corrections one after the other are both at once; an old one holds, whatever a later one says."""
-    run_file, answers = tmp_path / "run.h5", tmp_path / "a.csv"
-    assert track(write_recording(tmp_path), run_file) == 0
+    answers = tmp_path / "a.csv"
     given = ("swap,20,1,2,\n", "delete,,3,,\n")
-    for text, source, result in ((given[0], run_file, "one.h5"), (given[1], tmp_path / "one.h5", "two.h5")):
+    for text, source, result in ((given[0], undisturbed, "one.h5"), (given[1], tmp_path / "one.h5", "two.h5")):
         answers.write_text(f"action,frame,id,other,name\n{text}")
         correct(source, answers, output=tmp_path / result)
     answers.write_text(f"action,frame,id,other,name\n{''.join(given)}")
-    correct(run_file, answers, output=tmp_path / "both.h5")
+    correct(undisturbed, answers, output=tmp_path / "both.h5")
     two, both = (read_run(tmp_path / f"{name}.h5") for name in ("two", "both"))
     np.testing.assert_array_equal(two.trajectory, both.trajectory)
     assert sorted(two.answers.tolist()) == sorted(both.answers.tolist())
@@ -336,21 +332,17 @@ def test_a_second_correction_keeps_earlier_answers(tmp_path: Path) -> None:
         correct(tmp_path / "one.h5", answers, output=tmp_path / "back.h5")
 
 
-def test_rows_that_are_not_there_are_refused(tmp_path: Path) -> None:
-    run_file = tmp_path / "run.h5"
-    assert track(write_recording(tmp_path), run_file) == 0
+def test_rows_that_are_not_there_are_refused(undisturbed: Path, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\n")
-    correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "new.h5")
     with h5py.File(tmp_path / "new.h5", "r+") as file:
         file["answers"][0] = (10**6, 10**6 + 1, 1)
     with pytest.raises(FormatError, match="/answers: found row 1000001"):
         correct(tmp_path / "new.h5", tmp_path / "a.csv", output=tmp_path / "more.h5")
 
 
-def test_answers_that_cannot_all_be_true_are_refused(tmp_path: Path) -> None:
-    run_file = tmp_path / "run.h5"
-    assert track(write_recording(tmp_path), run_file) == 0
+def test_answers_that_cannot_all_be_true_are_refused(undisturbed: Path, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\nkeep,20,1,2,\n")
     with pytest.raises(InputError, match="contradicts others"):
-        correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
+        correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "new.h5")
     assert not (tmp_path / "new.h5").exists()

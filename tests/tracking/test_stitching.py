@@ -12,7 +12,7 @@ from stseg.config import Config, SegmentConfig, TrackingConfig
 from stseg.engine.offline.segments import segments
 from stseg.errors import ConfigError
 from stseg.records.tables import EVENT, TRAJECTORY
-from stseg.tracking.segment_stitching import SegmentTracks, Stitcher, rename_labels
+from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
 from stseg.tracking.windows.windows import windows
 
 
@@ -26,6 +26,14 @@ def walk(track: int, frames: range, x: float, speed: float = 0.0) -> Rows:
 
 def events(*told: tuple[int, str, int, int]) -> Rows:
     return np.array([(frame, kind.encode(), i, other, b"said") for frame, kind, i, other in told], EVENT)
+
+
+def stitched(*segments: tuple[Rows, Rows]) -> StitchedTracks:
+    """Rows and events of segments of twenty frames, joined."""
+    stitcher = Stitcher()
+    for number, (rows, told) in enumerate(segments):
+        stitcher.add(SegmentTracks(20 * number, rows, told))
+    return stitcher.joined()
 
 
 # How a recording is divided
@@ -71,34 +79,34 @@ def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> 
 
 
 def test_a_track_keeps_its_name_over_a_seam() -> None:
-    seams = Stitcher()
-    seams.add(
-        SegmentTracks(0, np.concatenate([walk(1, range(20), 0.0), walk(2, range(20), 4.0)]), events((0, "birth", 1, 0)))
-    )
+    first = np.concatenate([walk(1, range(20), 0.0), walk(2, range(20), 4.0)])
     later = np.concatenate([walk(1, range(15, 40), 4.1), walk(2, range(15, 40), 0.1)])
-    seams.add(SegmentTracks(20, later, events((25, "merge", 1, 2))))
-    joined = seams.joined()
+    joined = stitched((first, events((0, "birth", 1, 0))), (later, events((25, "merge", 1, 2))))
     assert joined.committed["frame"].tolist() == [*range(20), *range(20), *range(20, 40), *range(20, 40)]
     assert joined.committed["id"].tolist() == [1] * 20 + [2] * 20 + [2] * 20 + [1] * 20
     assert joined.local.tolist() == [1] * 20 + [2] * 20 + [1] * 20 + [2] * 20
     assert joined.events[["frame", "kind", "id", "other"]].tolist() == [(0, b"birth", 1, 0), (25, b"merge", 2, 1)]
 
 
-def test_whom_nobody_claims_was_born_or_has_died_at_the_seam() -> None:
-    seams = Stitcher()
-    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
-    seams.add(SegmentTracks(20, walk(1, range(18, 40), 3.0), events()))
-    joined = seams.joined()
+@pytest.mark.parametrize(
+    ("first", "later", "told"),
+    [
+        ((walk(1, range(20), 0.0), events()), (walk(1, range(18, 40), 3.0), events()), (19, 20)),
+        # What a segment says itself is not told again.
+        (
+            (walk(1, range(19), 0.0), events((18, "death", 1, 0))),
+            (walk(1, range(21, 40), 3.0), events((21, "birth", 1, 0))),
+            (18, 21),
+        ),
+    ],
+    ids=["unclaimed", "told"],
+)
+def test_unclaimed_tracks_end_and_begin_at_the_seam(
+    first: tuple[Rows, Rows], later: tuple[Rows, Rows], told: tuple[int, int]
+) -> None:
+    joined = stitched(first, later)
     assert np.unique(joined.committed["id"]).tolist() == [1, 2]
-    assert [(e["frame"], e["kind"], e["id"]) for e in joined.events] == [(19, b"death", 1), (20, b"birth", 2)]
-
-
-def test_who_was_said_to_be_dead_or_born_is_not_told_again() -> None:
-    seams = Stitcher()
-    seams.add(SegmentTracks(0, walk(1, range(19), 0.0), events((18, "death", 1, 0))))
-    seams.add(SegmentTracks(20, walk(1, range(21, 40), 3.0), events((21, "birth", 1, 0))))
-    told = seams.joined().events
-    assert [(e["frame"], e["kind"], e["id"]) for e in told] == [(18, b"death", 1), (21, b"birth", 2)]
+    assert [(e["frame"], e["kind"], e["id"]) for e in joined.events] == [(told[0], b"death", 1), (told[1], b"birth", 2)]
 
 
 def test_a_track_of_the_warm_up_alone_leaves_nothing() -> None:
@@ -117,10 +125,6 @@ def test_the_track_that_is_shared_longest_wins() -> None:
     seams.add(SegmentTracks(20, both, events()))
     later = seams.joined()
     assert later.committed["id"][later.local == 2].tolist()[-1] == 1
-
-
-def test_no_segments() -> None:
-    assert len(Stitcher().joined().committed) == 0
 
 
 # Names in the volume
