@@ -28,7 +28,7 @@ class Bins:
     y: tuple[float, float]
     """The ground rectangle, metres."""
     side: float
-    """Of a bin, metres."""
+    """Side of a bin, metres."""
 
     @classmethod
     def of(cls, grid: Grid) -> Bins:

@@ -22,7 +22,7 @@ class PlanMap:
 
     x: tuple[float, float]
     y: tuple[float, float]
-    """What is shown, metres."""
+    """Ground rectangle of the picture, metres."""
     scale: float
     """Pixels a metre."""
     corner: tuple[float, float]

@@ -9,7 +9,7 @@ import numpy as np
 from stseg.simulation.crowd.social_forces import CrowdFrame, stride
 from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
-_STEP = 0.05
+_HALF_INTERVAL = 0.05
 """Half interval of the finite differences of velocity, seconds."""
 _STANDING_SPEED = 0.05
 """Speed below which the heading stays, metres per second."""
@@ -23,8 +23,11 @@ def walk_routes(spec: SceneSpec) -> Iterator[CrowdFrame]:
     height = np.array([route.height for route in spec.routes])
     for frame in range(spec.frames):
         time = frame / spec.frame_rate
-        before, after = (np.stack([route.ground(one) for route in spec.routes]) for one in (time - _STEP, time + _STEP))
-        velocity = (after - before) / (2 * _STEP)
+        before, after = (
+            np.stack([route.ground(one) for route in spec.routes])
+            for one in (time - _HALF_INTERVAL, time + _HALF_INTERVAL)
+        )
+        velocity = (after - before) / (2 * _HALF_INTERVAL)
         speed = np.hypot(*velocity.T)
         heading = np.where(speed > _STANDING_SPEED, np.arctan2(velocity[:, 1], velocity[:, 0]), heading)
         swing = np.minimum(1.0, speed)

@@ -39,7 +39,7 @@ class Moment:
     seed: int
     camera: int
     frame: int
-    """Of the scene; number of the camera and of the frame."""
+    """Seed of the scene, number of the camera and of the frame."""
     frame_rate: float
     """Frames per second."""
     body_width: float
