@@ -16,27 +16,18 @@ from stseg.records.sizes import Sizes, log_heavy_tailed
 
 @dataclass(frozen=True)
 class Prior:
-    """One frame's prior.
-
-    Attributes
-    ----------
-    predicted
-        Tracks of earlier frames, predicted to this one.
-    config
-        The detector's constants.
-    body
-        Population prior of heights and widths.
-    border
-        Where people may enter.
-    cost
-        Cost of a birth far from the border, nats.
-    """
+    """One frame's prior."""
 
     predicted: PredictedTracks
+    """Tracks of earlier frames, predicted to this one."""
     config: DetectionConfig
+    """The detector's constants."""
     body: BodyConfig
+    """Population prior of heights and widths."""
     border: Border
+    """Where people may enter."""
     cost: float
+    """Cost of a birth far from the border, nats."""
 
     @classmethod
     def of(cls, predicted: PredictedTracks | None, config: DetectionConfig, body: BodyConfig, border: Border) -> Prior:

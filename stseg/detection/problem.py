@@ -21,18 +21,14 @@ PixelAssignment = NDArray[np.int16]
 
 
 class RaggedArray(NamedTuple):
-    """Rows of different lengths, one behind the other: row r is `item[start[r]:start[r + 1]]`, with its values.
-
-    Attributes
-    ----------
-    start : int64 (row + 1,)
-    item : int64 (k,)
-    value : float64 (k,)
-    """
+    """Rows of different lengths, one behind the other: row r is `item[start[r]:start[r + 1]]`, with its values."""
 
     start: Ints
+    """int64 (row + 1,)."""
     item: Ints
+    """int64 (k,)."""
     value: Floats
+    """float64 (k,)."""
 
 
 @kernel
@@ -78,55 +74,39 @@ class ScoreParameters(NamedTuple):
 
 
 class BoxEvidence(NamedTuple):
-    """Boxes of all views that deliver boxes.
-
-    Attributes
-    ----------
-    match : float64 (view, candidate, box)
-        Log-likelihood of the box given the candidate's pillar, nats, 0 at a perfect fit; -inf where there is no box.
-    boxes : int64 (view,)
-        Number of boxes of each view.
-    hiders
-        Candidates who hide a part of one, rising, with the share that they leave; the row of a candidate in a view is
-        view * candidates + candidate.
-    inside : float64 (view, candidate)
-        Share of the candidate's pillar inside the image.
-    visible_past : float64 (candidate,)
-        Scratch, 1 before and after: the share of one candidate that each other leaves visible.
-    """
+    """Boxes of all views that deliver boxes."""
 
     match: Floats
+    """float64 (view, candidate, box): log-likelihood of the box given the candidate's pillar, nats, 0 at a perfect fit;
+    -inf where there is no box."""
     boxes: Ints
+    """int64 (view,): number of boxes of each view."""
     hiders: RaggedArray
+    """Candidates who hide a part of one, rising, with the share that they leave; the row of a candidate in a view is
+    view * candidates + candidate."""
     inside: Floats
+    """float64 (view, candidate): share of the candidate's pillar inside the image."""
     visible_past: Floats
+    """float64 (candidate,): scratch, 1 before and after: the share of one candidate that each other leaves visible."""
 
 
 class PixelEvidence(NamedTuple):
-    """Foreground pixels of all views that deliver them, on rasters coarser than the images.
-
-    Attributes
-    ----------
-    raster : float32 (view, v, u)
-        Log-odds of foreground, nats.
-    scale : float32 (view, v, u)
-        Raster pixels of the largest body that explains each pixel (`blob_scale`); 0 where none does.
-    first : int64 (view, candidate)
-        First raster row of each candidate's outline; -1 where the view does not see it.
-    spans : int16 (view, candidate, row, 2)
-        First and last column (exclusive) of each row from `first` on; empty rows have both 0.
-    area : float64 (view, candidate)
-        Pixels of the whole outline, those outside the raster included.
-    distance : float64 (view, candidate)
-        Distance from the camera on the ground, metres.
-    """
+    """Foreground pixels of all views that deliver them, on rasters coarser than the images."""
 
     raster: Singles
+    """float32 (view, v, u): log-odds of foreground, nats."""
     scale: Singles
+    """float32 (view, v, u): raster pixels of the largest body that explains each pixel (`blob_scale`); 0 where none
+    does."""
     first: Ints
+    """int64 (view, candidate): first raster row of each candidate's outline; -1 where the view does not see it."""
     spans: Spans
+    """int16 (view, candidate, row, 2): first and last column (exclusive) of each row from `first` on; empty rows have
+    both 0."""
     area: Floats
+    """float64 (view, candidate): pixels of the whole outline, those outside the raster included."""
     distance: Floats
+    """float64 (view, candidate): distance from the camera on the ground, metres."""
 
     def joined_with(self, other: PixelEvidence) -> PixelEvidence:
         """The evidence for these candidates, then for those of the other, by the same pixels."""
@@ -142,45 +122,35 @@ class PixelEvidence(NamedTuple):
 
 
 class DetectionProblem(NamedTuple):
-    """The candidates of a frame, their evidence and their prior.
-
-    Attributes
-    ----------
-    boxes, pixels
-        Evidence of the views.
-    size_prior : float64 (candidate,)
-        Log prior density of each candidate's height and width, less that of the means, nats.
-    birth_cost : float64 (candidate,)
-        Cost of a birth at each place, nats.
-    track_gain : float64 (candidate, track)
-        Log-ratio of each candidate being each predicted track against being a birth that costs nothing, nats.
-    ground : float64 (candidate, 2)
-        Metres.
-    breadth : float64 (candidate,)
-        Ratio of each body's width to a common one, at least 1: wider bodies need more room. 1 without pixels.
-    parameters
-        Constants of the score.
-    assignment : int64 (at least boxes, at least v * u)
-        Scratch: after a view was scored, the place in the set of the member that each box or pixel is assigned to, -1
-        for none.
-    track_member : int64 (at least tracks,)
-        Scratch: after a set was scored, the place in it of the member who continues each track, -1 for none.
-    owner : int16 (view, v * u)
-        Scratch, -1 before and after: the candidate that each pixel is assigned to while sets are searched.
-    view_evidence : float64 (view, candidate + 1)
-        Scratch: after a set was scored, the evidence of each view for each of its members, nats; views with boxes
-        first.
-    """
+    """The candidates of a frame, their evidence and their prior."""
 
     boxes: BoxEvidence
+    """Evidence of the views with boxes."""
     pixels: PixelEvidence
+    """Evidence of the views with pixels."""
     size_prior: Floats
+    """float64 (candidate,): log prior density of each candidate's height and width, less that of the means, nats."""
     birth_cost: Floats
+    """float64 (candidate,): cost of a birth at each place, nats."""
     track_gain: Floats
+    """float64 (candidate, track): log-ratio of each candidate being each predicted track against being a birth that
+    costs nothing, nats."""
     ground: Floats
+    """float64 (candidate, 2): metres."""
     breadth: Floats
+    """float64 (candidate,): ratio of each body's width to a common one, at least 1: wider bodies need more room. 1
+    without pixels."""
     parameters: ScoreParameters
+    """Constants of the score."""
     assignment: Ints
+    """int64 (at least boxes, at least v * u): scratch: after a view was scored, the place in the set of the member that
+    each box or pixel is assigned to, -1 for none."""
     track_member: Ints
+    """int64 (at least tracks,): scratch: after a set was scored, the place in it of the member who continues each
+    track, -1 for none."""
     owner: PixelAssignment
+    """int16 (view, v * u): scratch, -1 before and after: the candidate that each pixel is assigned to while sets are
+    searched."""
     view_evidence: Floats
+    """float64 (view, candidate + 1): scratch: after a set was scored, the evidence of each view for each of its
+    members, nats; views with boxes first."""

@@ -29,30 +29,20 @@ NO_KNOWN_PEOPLE: Rows = np.zeros(0, KNOWN_PERSON)
 
 @dataclass(frozen=True)
 class IdentityProblem:
-    """Observations of a run, statistics of sizes and appearance, and the limits of the search.
-
-    Attributes
-    ----------
-    observations
-        The rows in the order of time.
-    model
-        Statistics of sizes and appearance.
-    motion
-        Motion model.
-    limits
-        Extent of the search.
-    frame_rate
-        Frames per second.
-    colours
-        The last axes of the model: those of colours; None where there are none.
-    """
+    """Observations of a run, statistics of sizes and appearance, and the limits of the search."""
 
     observations: Observations
+    """The rows in the order of time."""
     model: SizeModel
+    """Statistics of sizes and appearance."""
     motion: MotionConfig
+    """Motion model."""
     limits: SearchLimits
+    """Extent of the search."""
     frame_rate: float
+    """Frames per second."""
     colours: Axes | None = None
+    """The last axes of the model: those of colours; None where there are none."""
 
     @classmethod
     def of(
@@ -163,38 +153,26 @@ _LINK_WINDOW = 0.5
 
 @dataclass(frozen=True)
 class Link:
-    """A track that continues under the identity of another.
-
-    Attributes
-    ----------
-    frame
-        First frame under that identity.
-    identity, track
-        The identity, and the number of the track.
-    reason
-        In words.
-    """
+    """A track that continues under the identity of another."""
 
     frame: int
+    """First frame under that identity."""
     identity: int
+    """The identity."""
     track: int
+    """Number of the track."""
     reason: str
+    """In words."""
 
 
 @dataclass(frozen=True)
 class GlobalAssociation:
-    """Identities of a whole run.
-
-    Attributes
-    ----------
-    identity : int64 (row,)
-        Of each row of the trajectory.
-    links
-        Where they differ from the filter tracks.
-    """
+    """Identities of a whole run."""
 
     identity: Ints
+    """int64 (row,): identity of each row of the trajectory."""
     links: list[Link]
+    """Where they differ from the filter tracks."""
 
 
 def associate_globally(

@@ -78,13 +78,7 @@ class KernelFiles(CompileResultCacheImpl):
 
 
 class KernelCache(FunctionCache):
-    """Machine code of a kernel on disk.
-
-    Raises
-    ------
-    RuntimeError
-        Where no folder can be written to.
-    """
+    """Machine code of a kernel on disk. RuntimeError where no folder can be written to."""
 
     _impl_class = KernelFiles
 

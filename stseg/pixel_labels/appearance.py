@@ -26,24 +26,16 @@ _PIXELS = 100.0
 
 
 class Appearance(NamedTuple):
-    """Colours of tracks in one view.
-
-    Attributes
-    ----------
-    track : int64 (n,)
-        Ids, ascending.
-    mean : float64 (n, SLICES, 3)
-        mu, grey levels.
-    precision : float64 (n, SLICES, 3, 3)
-        Inverse of S.
-    peak : float64 (n, SLICES)
-        Density at the mean, per grey level cubed.
-    """
+    """Colours of tracks in one view."""
 
     track: Ints
+    """int64 (n,): ids, ascending."""
     mean: Floats
+    """float64 (n, SLICES, 3): mu, grey levels."""
     precision: Floats
+    """float64 (n, SLICES, 3, 3): inverse of S."""
     peak: Floats
+    """float64 (n, SLICES): density at the mean, per grey level cubed."""
 
 
 class BodyRows(NamedTuple):
@@ -54,23 +46,16 @@ class BodyRows(NamedTuple):
 
 
 class ColourSums(NamedTuple):
-    """Sums over pixels, from which an appearance is learned.
-
-    Attributes
-    ----------
-    track : int64 (n,)
-        Ids, ascending.
-    pixels : float64 (n, SLICES)
-    first : float64 (n, SLICES, 3)
-        Sums of colours.
-    second : float64 (n, SLICES, 3, 3)
-        Sums of their outer products.
-    """
+    """Sums over pixels, from which an appearance is learned."""
 
     track: Ints
+    """int64 (n,): ids, ascending."""
     pixels: Floats
+    """float64 (n, SLICES): number of pixels."""
     first: Floats
+    """float64 (n, SLICES, 3): sums of colours."""
     second: Floats
+    """float64 (n, SLICES, 3, 3): sums of their outer products."""
 
     @classmethod
     def of(cls, track: Ints) -> ColourSums:

@@ -35,21 +35,14 @@ _THINNEST = 0.3
 
 
 class Patches(NamedTuple):
-    """One value for each pixel of a rectangle around each person.
-
-    Attributes
-    ----------
-    edges : int64 (n, 4)
-        left, top, right, bottom, half open; all 0 for a person out of view.
-    first : int64 (n + 1,)
-        First value of each person; values are in row order.
-    share : float32 (m,)
-        0..1.
-    """
+    """One value for each pixel of a rectangle around each person."""
 
     edges: Ints
+    """int64 (n, 4): left, top, right, bottom, half open; all 0 for a person out of view."""
     first: Ints
+    """int64 (n + 1,): first value of each person; values are in row order."""
     share: Singles
+    """float32 (m,): 0..1."""
 
     def rectangles(self, corner: tuple[int, int] = (0, 0)) -> list[tuple[tuple[slice, slice], slice]]:
         """Rows and columns of each person's rectangle in a window with a corner (u, v), and the place of its values."""
@@ -118,46 +111,32 @@ def _fill_shares(first: Ints, spans: Spans, draws: int, edges: Ints, begin: Ints
 
 @dataclass(frozen=True)
 class PlacedPeople:
-    """People of one frame, in the order of their labels.
-
-    Attributes
-    ----------
-    ground : float64 (n, 2)
-        Metres.
-    covariance : float64 (n, 2, 2)
-        Covariance of each place, square metres.
-    height : float64 (n,)
-        Metres.
-    track : int64 (n,)
-        Ids.
-    """
+    """People of one frame, in the order of their labels."""
 
     ground: Floats
+    """float64 (n, 2): metres."""
     covariance: Floats
+    """float64 (n, 2, 2): covariance of each place, square metres."""
     height: Floats
+    """float64 (n,): metres."""
     track: Ints
+    """int64 (n,): ids."""
 
     def __len__(self) -> int:
         return len(self.ground)
 
 
 class LabelLikelihood(NamedTuple):
-    """Prior shares of the labels at the pixels of an image window.
-
-    Attributes
-    ----------
-    left, top
-        Corner of the window in the image, pixels.
-    background : float32 (v, u)
-        p_0, 0..1; has the size of the window.
-    people
-        p_j at the pixels of each person's rectangle, in image coordinates.
-    """
+    """Prior shares of the labels at the pixels of an image window."""
 
     left: int
+    """Corner of the window in the image."""
     top: int
+    """Pixels."""
     background: Singles
+    """float32 (v, u): p_0, 0..1; has the size of the window."""
     people: Patches
+    """p_j at the pixels of each person's rectangle, in image coordinates."""
 
     @property
     def window(self) -> tuple[slice, slice]:

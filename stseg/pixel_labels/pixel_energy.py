@@ -24,18 +24,12 @@ from stseg.pixel_labels.label_likelihood import LabelLikelihood, Patches
 
 @dataclass(frozen=True)
 class PixelEnergy:
-    """Pixels with admissible labels, and the energy of their labels.
-
-    Attributes
-    ----------
-    pixel : int64 (n,)
-        Indices in the flattened window, ascending.
-    energy
-        Label j + 1 is person j.
-    """
+    """Pixels with admissible labels, and the energy of their labels."""
 
     pixel: Ints
+    """int64 (n,): indices in the flattened window, ascending."""
     energy: LabelEnergy
+    """Label j + 1 is person j."""
 
 
 def pixel_energy(

@@ -12,36 +12,23 @@ UNASSIGNED = -1
 
 @dataclass(frozen=True)
 class Blobs:
-    """The blobs of one frame.
-
-    Attributes
-    ----------
-    cells : int32 (y, x)
-        Blob of each ground cell, counted from 1; 0 for none.
-    track : int64 (n,)
-        The track that claims each blob; UNASSIGNED for none.
-    person : int64 (n,)
-        The detected person that each blob holds, -1 for none.
-    ground : float64 (n, 2)
-        Centroid of the likelihood-weighted mass, metres.
-    covariance : float64 (n, 2, 2)
-        Square metres.
-    extent : float64 (n,)
-        Ground area, square metres.
-    height : float64 (n,)
-        Height of the uppermost occupied plane, metres.
-    mass : float64 (n,)
-        Mean log-odds of the occupied cells, nats.
-    touches : int64 (k, 2)
-        Pairs of blobs (counted from 0) that share one connected piece of ground.
-    """
+    """The blobs of one frame."""
 
     cells: Labels
+    """int32 (y, x): blob of each ground cell, counted from 1; 0 for none."""
     track: Ints
+    """int64 (n,): the track that claims each blob; UNASSIGNED for none."""
     person: Ints
+    """int64 (n,): the detected person that each blob holds, -1 for none."""
     ground: Floats
+    """float64 (n, 2): centroid of the likelihood-weighted mass, metres."""
     covariance: Floats
+    """float64 (n, 2, 2): square metres."""
     extent: Floats
+    """float64 (n,): ground area, square metres."""
     height: Floats
+    """float64 (n,): height of the uppermost occupied plane, metres."""
     mass: Floats
+    """float64 (n,): mean log-odds of the occupied cells, nats."""
     touches: Ints
+    """int64 (k, 2): pairs of blobs (counted from 0) that share one connected piece of ground."""

@@ -29,15 +29,12 @@ LOG_ODDS_KNOTS = np.linspace(-12.0, 12.0, 49)
 
 @dataclass(frozen=True)
 class CellCounts:
-    """Cells that were looked at and those that bodies fill, by the knot nearest to their log-odds.
-
-    Attributes
-    ----------
-    cells, filled : float64 (knot,)
-    """
+    """Cells that were looked at and those that bodies fill, by the knot nearest to their log-odds."""
 
     cells: Floats
+    """float64 (knot,): those that were looked at."""
     filled: Floats
+    """float64 (knot,): those that bodies fill."""
 
 
 def count_cells(log_odds: Singles, filled: Flags, counted: Flags) -> CellCounts:
@@ -68,15 +65,10 @@ def filled_cells(grid: Grid, rows: Rows) -> Flags:
 
 @dataclass(frozen=True)
 class CellReliability:
-    """The calibration curve of a run.
-
-    Attributes
-    ----------
-    probability : float64 (knot,)
-        That a body fills a cell, at log-odds `LOG_ODDS_KNOTS`; never falls.
-    """
+    """The calibration curve of a run."""
 
     probability: Floats
+    """float64 (knot,): probability that a body fills a cell, at log-odds `LOG_ODDS_KNOTS`; never falls."""
 
     @classmethod
     def of(cls, counts: Iterable[CellCounts]) -> CellReliability:

@@ -31,20 +31,14 @@ _EXPRESSIVE = 0.25
 
 @dataclass(frozen=True)
 class GhostReasons:
-    """Ghosts with their reasons.
-
-    Attributes
-    ----------
-    ghosts : rows (n,) with frame, x, y, evidence, parts
-    reason : int64 (n,)
-        Main reason: `DENIED`, `OTHERS` or `TOO_LITTLE`.
-    denies : bool (n, view)
-        Views with evidence against it, whatever the main reason.
-    """
+    """Ghosts with their reasons."""
 
     ghosts: Rows
+    """rows (n,) with frame, x, y, evidence, parts."""
     reason: Ints
+    """int64 (n,): main reason: `DENIED`, `OTHERS` or `TOO_LITTLE`."""
     denies: Flags
+    """bool (n, view): views with evidence against it, whatever the main reason."""
 
     def counts(self) -> list[int]:
         """Number of ghosts of each reason."""

@@ -15,40 +15,28 @@ from stseg.records.sizes import Sizes
 
 @dataclass(frozen=True)
 class People:
-    """Candidates with places, sizes and evidence: people, or ghosts.
-
-    Attributes
-    ----------
-    ground : float64 (n, 2)
-        Metres.
-    height, width : float64 (n,)
-        By all frames so far, metres.
-    covariance : float64 (n, 2, 2)
-        Square metres.
-    evidence : float64 (n,)
-        Log-odds of the person by all views and the prior, given the others, nats.
-    view_evidence : float64 (view, n)
-        Part of each view, nats.
-    visibility : float64 (view, n)
-        Share of each body that a view sees past nearer people, 0..1.
-    prior : float64 (n,)
-        Part of the prior, nats.
-    track_index : int64 (n,)
-        The predicted track that each continues, -1 for births.
-    sizes
-        Size posteriors of this frame alone, under the population prior.
-    """
+    """Candidates with places, sizes and evidence: people, or ghosts."""
 
     ground: Floats
+    """float64 (n, 2): metres."""
     height: Floats
+    """float64 (n,): by all frames so far, metres."""
     width: Floats
+    """float64 (n,): by all frames so far, metres."""
     covariance: Floats
+    """float64 (n, 2, 2): square metres."""
     evidence: Floats
+    """float64 (n,): log-odds of the person by all views and the prior, given the others, nats."""
     view_evidence: Floats
+    """float64 (view, n): part of each view, nats."""
     visibility: Floats
+    """float64 (view, n): share of each body that a view sees past nearer people, 0..1."""
     prior: Floats
+    """float64 (n,): part of the prior in the evidence, nats."""
     track_index: Ints
+    """int64 (n,): the predicted track that each continues, -1 for births."""
     sizes: Sizes
+    """Size posteriors of this frame alone, under the population prior."""
 
     def __len__(self) -> int:
         return len(self.ground)
@@ -56,30 +44,23 @@ class People:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Result of per-frame detection.
-
-    Attributes
-    ----------
-    people
-        The accepted candidates.
-    ghosts
-        The rejected candidates.
-    pixel_assignment : tuple of int16 arrays (v, u)
-        For each view the index of the person of the nearest body at each raster pixel, -1 for none.
-    raster_step : tuple of int
-        Image pixels to a raster pixel of `pixel_assignment`, for each view.
-    box_assignment : tuple of int64 arrays (box,)
-        For each view with boxes the person that each box is assigned to, -1 for none; empty for other views.
-    residual : float64 (view,)
-        Reprojection residual, metres (see `stseg.view_health.reprojection_residuals`); nan where nothing was measured.
-    """
+    """Result of per-frame detection."""
 
     people: People
+    """The accepted candidates."""
     ghosts: People
+    """The rejected candidates."""
     pixel_assignment: tuple[NDArray[np.int16], ...]
+    """tuple of int16 arrays (v, u): for each view the index of the person of the nearest body at each raster pixel, -1
+    for none."""
     raster_step: tuple[int, ...]
+    """tuple of int: image pixels to a raster pixel of `pixel_assignment`, for each view."""
     box_assignment: tuple[Ints, ...]
+    """tuple of int64 arrays (box,): for each view with boxes the person that each box is assigned to, -1 for none;
+    empty for other views."""
     residual: Floats
+    """float64 (view,): reprojection residual, metres (see `stseg.view_health.reprojection_residuals`); nan where
+    nothing was measured."""
 
 
 def empty_explanation(rig: Rig, evidence: Sequence[ViewEvidence]) -> Explanation:

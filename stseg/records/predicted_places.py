@@ -9,22 +9,15 @@ from stseg.arrays import Flags, Floats, Ints
 
 @dataclass(frozen=True)
 class PredictedPlaces:
-    """Predicted places of tracks in the frames of a window.
-
-    Attributes
-    ----------
-    track : int64 (k,)
-        Track numbers, 1 or more, rising.
-    expected : bool (time, k)
-        Whether the track has a prediction in the frame.
-    ground, covariance : float64 (time, k, 2), (time, k, 2, 2)
-        Metres, square metres.
-    height : float64 (time, k)
-        Of their heads, metres.
-    """
+    """Predicted places of tracks in the frames of a window."""
 
     track: Ints
+    """int64 (k,): track numbers, 1 or more, rising."""
     expected: Flags
+    """bool (time, k): whether the track has a prediction in the frame."""
     ground: Floats
+    """float64 (time, k, 2): metres."""
     covariance: Floats
+    """float64 (time, k, 2, 2): square metres."""
     height: Floats
+    """float64 (time, k): of their heads, metres."""

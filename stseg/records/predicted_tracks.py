@@ -30,22 +30,16 @@ LEAST_HEIGHT_RATIO = -4.0
 
 @dataclass(frozen=True)
 class PredictedTracks:
-    """Tracks of earlier frames, predicted to this frame.
-
-    Attributes
-    ----------
-    ground : float64 (n, 2), covariance : float64 (n, 2, 2)
-        Metres, square metres; measurement noise of this frame included.
-    sizes
-        Heights and widths; measurement noise of this frame included in their variances.
-    existence : float64 (n,)
-        Log-odds that the track still exists, nats.
-    """
+    """Tracks of earlier frames, predicted to this frame."""
 
     ground: Floats
+    """float64 (n, 2): metres."""
     covariance: Floats
+    """float64 (n, 2, 2): square metres; measurement noise of this frame included."""
     sizes: Sizes
+    """Heights and widths; measurement noise of this frame included in their variances."""
     existence: Floats
+    """float64 (n,): log-odds that the track still exists, nats."""
 
     def __len__(self) -> int:
         return len(self.ground)

@@ -13,22 +13,16 @@ from stseg.kernels.accelerate import kernel
 
 @dataclass(frozen=True)
 class SparseVolume:
-    """Log-odds of a frame: those of the cells at which something is shown, and one value for each set of views.
-
-    Attributes
-    ----------
-    of_cell : int32 (plane, y, x)
-        The set of views of each cell.
-    empty : float32 (set,)
-        Log-odds of the other cells of each set, nats; nan where no view sees them.
-    cell : int32 (n,), value : float32 (n,)
-        Indices in the flattened volume, and log-odds there, nats.
-    """
+    """Log-odds of a frame: those of the cells at which something is shown, and one value for each set of views."""
 
     of_cell: Labels
+    """int32 (plane, y, x): the set of views of each cell."""
     empty: Singles
+    """float32 (set,): log-odds of the other cells of each set, nats; nan where no view sees them."""
     cell: Labels
+    """int32 (n,): indices in the flattened volume."""
     value: Singles
+    """float32 (n,): log-odds at these cells, nats."""
 
     @classmethod
     def whole(cls, volume: Singles) -> Self:

@@ -166,19 +166,14 @@ KNOWN_PERSON = np.dtype(
 
 @dataclass(frozen=True)
 class Tracks:
-    """Result of a tracker.
-
-    Attributes
-    ----------
-    trajectory : TRAJECTORY (n,)
-        Sorted by frame, then id.
-    boxes : BOX (m,)
-    events : EVENT (k,)
-    """
+    """Result of a tracker."""
 
     trajectory: Rows
+    """TRAJECTORY (n,): sorted by frame, then id."""
     boxes: Rows = field(default_factory=lambda: np.zeros(0, BOX))
+    """BOX (m,)."""
     events: Rows = field(default_factory=lambda: np.zeros(0, EVENT))
+    """EVENT (k,)."""
 
     def summary(self) -> Rows:
         """One TRACK row per id, sorted by id."""

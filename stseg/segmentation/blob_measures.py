@@ -15,23 +15,18 @@ _ZERO = np.float32(0)
 
 
 class BlobMeasures(NamedTuple):
-    """Measures of the blobs (n,) of a frame, as of `stseg.records.blobs.Blobs`.
-
-    Attributes
-    ----------
-    ground : float64 (n, 2), covariance : float64 (n, 2, 2)
-        Centroid of the mass, metres; the cells' spread around it, square metres.
-    cells : float64 (n,)
-        Number of ground cells.
-    height, mass : float64 (n,)
-        Metres, nats.
-    """
+    """Measures of the blobs (n,) of a frame, as of `stseg.records.blobs.Blobs`."""
 
     ground: Floats
+    """float64 (n, 2): centroid of the mass, metres."""
     covariance: Floats
+    """float64 (n, 2, 2): the cells' spread around it, square metres."""
     cells: Floats
+    """float64 (n,): number of ground cells."""
     height: Floats
+    """float64 (n,): metres."""
     mass: Floats
+    """float64 (n,): nats."""
 
 
 @part

@@ -29,28 +29,20 @@ Links = tuple[Ints, Ints, Floats]
 
 @dataclass(frozen=True)
 class WindowCandidates:
-    """Candidates of all frames of a window, by rising frame.
-
-    Attributes
-    ----------
-    frame : int64 (n,)
-        From the window's first.
-    ground, covariance : float64 (n, 2), (n, 2, 2)
-        Metres, square metres.
-    height : float64 (n,)
-        Metres.
-    evidence : float64 (n,)
-        Evidence of the views alone, given the detector's people of the frame, nats.
-    track : int64 (n,)
-        Track that the detector gave each person; 0 for rejected candidates.
-    """
+    """Candidates of all frames of a window, by rising frame."""
 
     frame: Ints
+    """int64 (n,): counted from the window's first."""
     ground: Floats
+    """float64 (n, 2): metres."""
     covariance: Floats
+    """float64 (n, 2, 2): square metres."""
     height: Floats
+    """float64 (n,): metres."""
     evidence: Floats
+    """float64 (n,): evidence of the views alone, given the detector's people of the frame, nats."""
     track: Ints
+    """int64 (n,): track that the detector gave each person; 0 for rejected candidates."""
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -58,21 +50,14 @@ class WindowCandidates:
 
 @dataclass(frozen=True)
 class LinkModel:
-    """Gains of links.
-
-    Attributes
-    ----------
-    frame_rate
-        Frames per second.
-    patience
-        Longest absence inside a path, seconds.
-    prior_log_odds
-        Log of the prior odds of a person at a place, nats.
-    """
+    """Gains of links."""
 
     frame_rate: float
+    """Frames per second."""
     patience: float
+    """Longest absence inside a path, seconds."""
     prior_log_odds: float
+    """Log of the prior odds of a person at a place, nats."""
     motion: MotionConfig
     body: BodyConfig
 

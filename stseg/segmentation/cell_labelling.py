@@ -38,34 +38,22 @@ class CellPlaces(Protocol):
 
 @dataclass(frozen=True)
 class WindowDetections:
-    """Per-frame detections of a window.
-
-    Attributes
-    ----------
-    ground : float64 (n, 2) for each frame
-        Metres.
-    track : int64 (n,) for each frame
-        Track of each detection.
-    """
+    """Per-frame detections of a window."""
 
     ground: Sequence[Floats]
+    """float64 (n, 2) for each frame: metres."""
     track: Sequence[Ints]
+    """int64 (n,) for each frame: track of each detection."""
 
 
 @dataclass(frozen=True)
 class WindowLabels:
-    """The labels of a window.
-
-    Attributes
-    ----------
-    label : int32 (time, plane, y, x)
-        Track of each cell, UNASSIGNED without one, 0 for background.
-    cells
-        Number of cells divided by expansion moves; 0 where no two tracks touch.
-    """
+    """The labels of a window."""
 
     label: Labels
+    """int32 (time, plane, y, x): track of each cell, UNASSIGNED without one, 0 for background."""
     cells: int
+    """Number of cells divided by expansion moves; 0 where no two tracks touch."""
 
 
 def label_cells(

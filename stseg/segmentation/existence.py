@@ -44,24 +44,16 @@ Exclusions = tuple[Ints, Ints]
 
 @dataclass(frozen=True)
 class Existence:
-    """Decision over a window.
-
-    Attributes
-    ----------
-    real : bool (n,)
-        Candidates that are people.
-    successor : int64 (n,)
-        Link of each candidate, -1 for none.
-    log_odds : float64 (n,)
-        Marginal log-odds of each candidate along its path, nats.
-    gap
-        Bound on the distance from the least energy, given the links, nats.
-    """
+    """Decision over a window."""
 
     real: Flags
+    """bool (n,): candidates that are people."""
     successor: Ints
+    """int64 (n,): link of each candidate, -1 for none."""
     log_odds: Floats
+    """float64 (n,): marginal log-odds of each candidate along its path, nats."""
     gap: float
+    """Bound on the distance from the least energy, given the links, nats."""
 
 
 class _Solution(NamedTuple):
@@ -76,18 +68,12 @@ class _Solution(NamedTuple):
 
 @dataclass(frozen=True)
 class ExistenceModel:
-    """Terms of the energy for one scene.
-
-    Attributes
-    ----------
-    links
-        b.
-    reach
-        Distance below which candidates of one frame exclude each other, metres.
-    """
+    """Terms of the energy for one scene."""
 
     links: LinkModel
+    """b."""
     reach: float
+    """Distance below which candidates of one frame exclude each other, metres."""
     border: Border
     detection: DetectionConfig
     body: BodyConfig

@@ -32,21 +32,14 @@ GATE = 13.8
 
 @dataclass(frozen=True)
 class BodyShape:
-    """Extent of every body.
-
-    Attributes
-    ----------
-    reach
-        R: reach of a body's cells around its place, metres.
-    height_spread
-        s: standard deviation of a head's height, metres.
-    prior_share
-        pi: prior share of occupied cells, 0..1.
-    """
+    """Extent of every body."""
 
     reach: float
+    """R: reach of a body's cells around its place, metres."""
     height_spread: float
+    """s: standard deviation of a head's height, metres."""
     prior_share: float
+    """pi: prior share of occupied cells, 0..1."""
 
 
 def track_shares(

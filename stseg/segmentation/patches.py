@@ -38,20 +38,13 @@ _EIGHT = np.ones((3, 3), bool)
 
 @dataclass(frozen=True)
 class Patches:
-    """Rectangles of a grid's ground, beside each other on a sheet (row, column) with an empty column between them.
-
-    Attributes
-    ----------
-    grid
-    rectangles
-        Rows and columns of the ground.
-    place : int64 (row, column)
-        Ground cell of each, in the flattened ground; -1 between patches.
-    """
+    """Rectangles of a grid's ground, beside each other on a sheet (row, column) with an empty column between them."""
 
     grid: Grid
     rectangles: tuple[tuple[slice, slice], ...]
+    """Rows and columns of the ground."""
     place: Ints
+    """int64 (row, column): ground cell of each, in the flattened ground; -1 between patches."""
 
     @classmethod
     def of(cls, grid: Grid, squares: Flags) -> Self:

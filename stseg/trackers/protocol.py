@@ -16,24 +16,16 @@ from stseg.records.sparse_volume import SparseVolume
 
 @dataclass(frozen=True)
 class FusedFrame:
-    """One frame after detection and fusion.
-
-    Attributes
-    ----------
-    frame
-        Its number in the recording.
-    people
-        Its detections.
-    ghosts
-        Rejected candidates.
-    made
-        The volume, or a function that gives it where the fusion may still be at work.
-    """
+    """One frame after detection and fusion."""
 
     frame: int
+    """Its number in the recording."""
     people: People
+    """Its detections."""
     ghosts: People
+    """Rejected candidates."""
     made: SparseVolume | Callable[[], SparseVolume]
+    """The volume, or a function that gives it where the fusion may still be at work."""
 
     @property
     def volume(self) -> SparseVolume:
@@ -48,39 +40,28 @@ class FusedFrame:
 
 @dataclass(frozen=True)
 class FrameObservations:
-    """The observations and evidence of a frame, in the rig's order; valid only while the frame is added.
-
-    Attributes
-    ----------
-    observations
-        Raw data of each camera; `stseg.baselines.colour_views` extracts colour.
-    evidence
-        Foreground of each view: boxes, a likelihood map float32 (v, u), or None for a blind view.
-    """
+    """The observations and evidence of a frame, in the rig's order; valid only while the frame is added."""
 
     observations: Sequence[Observation]
+    """Raw data of each camera; `stseg.baselines.colour_views` extracts colour."""
     evidence: Sequence[ViewEvidence]
+    """Foreground of each view: boxes, a likelihood map float32 (v, u), or None for a blind view."""
 
 
 @dataclass(frozen=True)
 class Commit:
-    """Committed frames and their tracks.
-
-    Attributes
-    ----------
-    frames
-        In order.
-    label : int32 (time, plane, y, x)
-        Track ids, 0 for background.
-    trajectory, events, windows
-        Rows of `stseg.records.tables`: TRAJECTORY, EVENT, WINDOW.
-    """
+    """Committed frames and their tracks."""
 
     frames: list[FusedFrame]
+    """Frames in order."""
     label: Labels
+    """int32 (time, plane, y, x): track ids, 0 for background."""
     trajectory: Rows
+    """Rows of `stseg.records.tables`, TRAJECTORY."""
     events: Rows
+    """Rows of EVENT."""
     windows: Rows
+    """Rows of WINDOW."""
 
 
 class TrackingMethod(Protocol):

@@ -15,24 +15,20 @@ Event = tuple[int, str, int, int, str]
 
 
 class TrackPlaces(NamedTuple):
-    """The n tracks of one frame.
-
-    Attributes
-    ----------
-    ids : int64 (n,)
-        Track numbers.
-    ground, covariance : float64 (n, 2), (n, 2, 2)
-        Metres, square metres.
-    height, width, score : float64 (n,)
-        Metres, metres, nats.
-    """
+    """The n tracks of one frame."""
 
     ids: Ints
+    """int64 (n,): track numbers."""
     ground: Floats
+    """float64 (n, 2): metres."""
     covariance: Floats
+    """float64 (n, 2, 2): square metres."""
     height: Floats
+    """float64 (n,): metres."""
     width: Floats
+    """float64 (n,): metres."""
     score: Floats
+    """float64 (n,): nats."""
 
 
 def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats, views: Ints) -> Rows:

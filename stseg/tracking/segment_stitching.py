@@ -24,41 +24,28 @@ _SAME_PLACE_DISTANCE = 0.35
 
 @dataclass(frozen=True)
 class SegmentTracks:
-    """The tracks of one segment, under its own names.
-
-    Attributes
-    ----------
-    first
-        First frame that the segment commits.
-    trajectory : TRAJECTORY (n,)
-        Includes its warm-up, the frames before `first`.
-    events : EVENT (m,)
-        Of the frames that it commits.
-    gap
-        Frames before `first` that no camera has; 0 where the segment continues the one before.
-    """
+    """The tracks of one segment, under its own names."""
 
     first: int
+    """First frame that the segment commits."""
     trajectory: Rows
+    """TRAJECTORY (n,): includes its warm-up, the frames before `first`."""
     events: Rows
+    """EVENT (m,): of the frames that it commits."""
     gap: int = 0
+    """Frames before `first` that no camera has; 0 where the segment continues the one before."""
 
 
 @dataclass(frozen=True)
 class StitchedTracks:
-    """The tracks of all segments, under names of the run.
-
-    Attributes
-    ----------
-    committed : TRAJECTORY (n,)
-    local : int64 (n,)
-        Name of each row in its segment.
-    events : EVENT (m,)
-    """
+    """The tracks of all segments, under names of the run."""
 
     committed: Rows
+    """TRAJECTORY (n,)."""
     local: Ints
+    """int64 (n,): name of each row in its segment."""
     events: Rows
+    """EVENT (m,)."""
 
 
 class Stitcher:

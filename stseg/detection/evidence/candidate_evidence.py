@@ -39,18 +39,13 @@ def peaks(score: Floats, lattice_ground: Floats, heights: Floats, widths: Floats
 
 @dataclass(frozen=True)
 class ProjectedBodies:
-    """Candidates in the views that deliver boxes.
-
-    Attributes
-    ----------
-    edges : float64 (view, candidate, 4)
-        left, top, right, bottom, pixels, not clipped to the image; nan where the view cannot see the place.
-    distance : float64 (view, candidate)
-        Distance from the camera on the ground, metres.
-    """
+    """Candidates in the views that deliver boxes."""
 
     edges: Floats
+    """float64 (view, candidate, 4): left, top, right, bottom, pixels, not clipped to the image; nan where the view
+    cannot see the place."""
     distance: Floats
+    """float64 (view, candidate): distance from the camera on the ground, metres."""
 
     @classmethod
     def of(cls, views: Sequence[View], pool: Candidates) -> ProjectedBodies:

@@ -21,31 +21,22 @@ _PILLARS_AT_ONCE = 4096
 
 
 class PixelLattice(NamedTuple):
-    """Pillars of the birth lattice in all views of a rig that deliver pixels.
-
-    Attributes
-    ----------
-    outlines
-        Of the pillars (view * cell * height,), which are asked for cell by cell; areas are fair ones.
-    boxes : int16 (view, cell, 4)
-        left, top, right, bottom of the box around the outlines of all heights, raster pixels.
-    strips : int16 (view, strip, 4)
-        The same around the outlines of a strip's cells.
-    shapes : int64 (view, 2)
-        Rows and columns of the rasters.
-    owner : int16 (view, v * u)
-        Owners of the pixels of rasters, -1, but while a search uses them.
-    above, left_of
-        Scratch of `stseg.detection.evidence.unexplained_pixels`, allocated once.
-    """
+    """Pillars of the birth lattice in all views of a rig that deliver pixels."""
 
     outlines: PackedOutlines
+    """The pillars (view * cell * height,), which are asked for cell by cell; areas are fair ones."""
     boxes: Shorts
+    """int16 (view, cell, 4): left, top, right, bottom of the box around the outlines of all heights, raster pixels."""
     strips: Shorts
+    """int16 (view, strip, 4): the same around the outlines of a strip's cells."""
     shapes: Ints
+    """int64 (view, 2): rows and columns of the rasters."""
     owner: Shorts
+    """int16 (view, v * u): owners of the pixels of rasters, -1, but while a search uses them."""
     above: Labels
+    """Scratch of `stseg.detection.evidence.unexplained_pixels`, allocated once."""
     left_of: Floats
+    """Scratch of the same, allocated once."""
 
     @classmethod
     def of(cls, views: Sequence[View], lattice_ground: Floats, body: BodyConfig) -> Self:

@@ -20,37 +20,26 @@ QUANTA_PER_NAT = 64.0
 
 
 class UnexplainedPixels(NamedTuple):
-    """Unexplained pixels of all views that deliver pixels, valid until the next ones are made.
-
-    Attributes
-    ----------
-    raster : float32 (view, v, u)
-        Log-odds, nats.
-    owner : int16 (pixel,)
-        The member who explains each pixel of one view after the other, -1 for none.
-    start : int64 (view,)
-        Where each view begins in it.
-    left_of : float64 (view, v, u + 1)
-        Sums of the unexplained log-odds along rows, from the left, nats, as far as `summed_to`.
-    known : uint64 (view, v)
-        The last column of each row that is summed.
-    above : int32 (view, v + 1, u + 1)
-        Sums of the excess of pixels above and to the left over the lowest, in quanta and rounded up. It is at least
-        one quantum of each that is explained, or is not the lowest.
-    is_shown : bool (view, strip)
-        Whether the box of a strip has any excess.
-    extremes : float64 (view, 2)
-        The lowest and the highest log-odds, nats.
-    """
+    """Unexplained pixels of all views that deliver pixels, valid until the next ones are made."""
 
     raster: Singles
+    """float32 (view, v, u): log-odds, nats."""
     owner: Shorts
+    """int16 (pixel,): the member who explains each pixel of one view after the other, -1 for none."""
     start: Ints
+    """int64 (view,): first pixel of each view in `owner`."""
     left_of: Floats
+    """float64 (view, v, u + 1): sums of the unexplained log-odds along rows, from the left, nats, as far as
+    `summed_to`."""
     summed_to: NDArray[np.uint64]
+    """uint64 (view, v): the last column of each row that is summed."""
     above: Labels
+    """int32 (view, v + 1, u + 1): sums of the excess of pixels above and to the left over the lowest, in quanta and
+    rounded up. It is at least one quantum of each that is explained, or is not the lowest."""
     is_shown: Flags
+    """bool (view, strip): whether the box of a strip has any excess."""
     extremes: Floats
+    """float64 (view, 2): the lowest and the highest log-odds, nats."""
 
     @classmethod
     def of(cls, rasters: Singles, owners: Shorts, lattice: PixelLattice, extremes: Floats) -> Self:

@@ -27,45 +27,34 @@ class BoxPairs(NamedTuple):
 
 
 class BoxState(NamedTuple):
-    """Links of the candidates through boxes; the row of a candidate in a view is view * candidates + candidate.
-
-    Attributes
-    ----------
-    views
-        Number of views with boxes.
-    boxes
-        Most boxes of a view: the row of a box is view * boxes + box.
-    fits
-        Boxes that a candidate may gain by, with the gain against no box at no cost, nats.
-    fitting
-        The candidates of each box.
-    hidden
-        Candidates that one hides in part, with the share that is left.
-    hiders
-        Candidates who hide a part of one, with the share that they leave.
-    visible, missing_cost : float64 (view * candidate,)
-        Share of the candidate's pillar inside the image, and the cost of a missing box of one that no member hides,
-        nats.
-    is_cached : bool (view * candidate,), before, after : float64 (view * candidate,)
-        Whether the view's score of the candidate's linked members is cached, and that score, without and with the
-        candidate, nats.
-    linked : int64 (candidate + 1,), is_linked : bool (candidate,), pairs
-        Scratch; no candidate is linked before and after.
-    """
+    """Links of the candidates through boxes; the row of a candidate in a view is view * candidates + candidate."""
 
     views: int
+    """Number of views with boxes."""
     boxes: int
+    """Most boxes of a view: the row of a box is view * boxes + box."""
     fits: RaggedArray
+    """Boxes that a candidate may gain by, with the gain against no box at no cost, nats."""
     fitting: RaggedArray
+    """The candidates of each box."""
     hidden: RaggedArray
+    """Candidates that one hides in part, with the share that is left."""
     hiders: RaggedArray
+    """Candidates who hide a part of one, with the share that they leave."""
     visible: Floats
+    """float64 (view * candidate,): share of the candidate's pillar inside the image."""
     missing_cost: Floats
+    """float64 (view * candidate,): cost of a missing box of a candidate that no member hides, nats."""
     is_cached: Flags
+    """bool (view * candidate,): whether the view's score of the candidate's linked members is cached."""
     before: Floats
+    """float64 (view * candidate,): that score without the candidate, nats."""
     after: Floats
+    """float64 (view * candidate,): that score with the candidate, nats."""
     linked: Ints
+    """int64 (candidate + 1,): scratch, as are `is_linked` and `pairs`."""
     is_linked: Flags
+    """bool (candidate,): no candidate is linked before and after."""
     pairs: BoxPairs
 
 

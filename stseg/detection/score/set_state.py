@@ -20,28 +20,20 @@ from stseg.kernels.accelerate import kernel, part
 
 
 class SetState(NamedTuple):
-    """A set of candidates of a problem, to which members are added, and from which they are removed.
-
-    Attributes
-    ----------
-    problem
-        The candidates; its `owner` is the set's assignment of pixels between `assign` and `release`.
-    members : int64 (candidate + 1,), size : int64 (1,)
-        The first `size[0]` are the set.
-    inside : bool (candidate,)
-        The set, and members of groups that do not interact with it.
-    boxes
-        Links of candidates through boxes, and what is cached of the set.
-    tracks
-        The assignment of tracks to the set.
-    """
+    """A set of candidates of a problem, to which members are added, and from which they are removed."""
 
     problem: DetectionProblem
+    """The candidates; its `owner` is the set's assignment of pixels between `assign` and `release`."""
     members: Ints
+    """int64 (candidate + 1,): the first `size[0]` are the set."""
     size: Ints
+    """int64 (1,)."""
     inside: Flags
+    """bool (candidate,): the set, and members of groups that do not interact with it."""
     boxes: BoxState
+    """Links of candidates through boxes, and what is cached of the set."""
     tracks: TrackState
+    """The assignment of tracks to the set."""
 
 
 @kernel

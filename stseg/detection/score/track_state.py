@@ -19,24 +19,20 @@ _ROUNDING_MARGIN = 1e-12
 
 
 class TrackState(NamedTuple):
-    """Tracks of candidates, and their assignment to a set.
-
-    Attributes
-    ----------
-    gains
-        The tracks that each candidate gains by, with the gain against a birth, nats.
-    member_of : int64 (track,), member_gain : float64 (track,)
-        The member who continues each track, -1 for none, and the gain of that.
-    reached : int64 (track,), path_gain : float64 (track,), before : int64 (track,)
-        Scratch: tracks on paths, the gain where a path ends at each, -inf before and after, and the one before it.
-    """
+    """Tracks of candidates, and their assignment to a set."""
 
     gains: RaggedArray
+    """The tracks that each candidate gains by, with the gain against a birth, nats."""
     member_of: Ints
+    """int64 (track,): the member who continues each track, -1 for none."""
     member_gain: Floats
+    """float64 (track,): the gain of that, nats."""
     reached: Ints
+    """int64 (track,): scratch: tracks on paths."""
     path_gain: Floats
+    """float64 (track,): scratch: the gain where a path ends at each track, -inf before and after."""
     before: Ints
+    """int64 (track,): scratch: the track before each on its path."""
 
 
 @kernel

@@ -29,22 +29,16 @@ _MINIMUM_FITTED_EVIDENCE = 2.0
 
 @dataclass(frozen=True)
 class FrameSearch:
-    """The search, for the views of one rig.
-
-    Attributes
-    ----------
-    lattice_ground : float64 (y, x, 2)
-        The birth lattice, metres.
-    has_boxes
-        Whether any view delivers boxes.
-    rounds, swap_sweeps
-        Rounds of candidates, and sweeps of swap moves in the final search, at most.
-    """
+    """The search, for the views of one rig."""
 
     lattice_ground: Floats
+    """float64 (y, x, 2): the birth lattice, metres."""
     has_boxes: bool
+    """Whether any view delivers boxes."""
     rounds: int
+    """Rounds of candidates, at most."""
     swap_sweeps: int
+    """Sweeps of swap moves in the final search, at most."""
 
     def of_tracks(self, evidence: FrameEvidence) -> MapEstimate:
         """The best set of the predicted tracks alone."""

@@ -25,65 +25,42 @@ from stseg.records.candidates import Candidates
 
 @dataclass(frozen=True)
 class SetScore:
-    """Score of a set of candidates.
-
-    Attributes
-    ----------
-    total
-        Nats.
-    view_evidence : float64 (view, member)
-        Evidence of each view for each member, nats.
-    track_index : int64 (member,)
-        The predicted track that each member continues, -1 for births.
-    """
+    """Score of a set of candidates."""
 
     total: float
+    """Nats."""
     view_evidence: Floats
+    """float64 (view, member): evidence of each view for each member, nats."""
     track_index: Ints
+    """int64 (member,): the predicted track that each member continues, -1 for births."""
 
 
 @dataclass(frozen=True)
 class Additions:
-    """Candidates outside a set, each as a further member.
-
-    Attributes
-    ----------
-    gain : float64 (m,)
-        Change of the score, nats.
-    view_evidence : float64 (view, m)
-        Evidence of each view for the candidate, nats.
-    track_index : int64 (m,)
-        The predicted track that it would continue, -1 for births.
-    """
+    """Candidates outside a set, each as a further member."""
 
     gain: Floats
+    """float64 (m,): change of the score, nats."""
     view_evidence: Floats
+    """float64 (view, m): evidence of each view for the candidate, nats."""
     track_index: Ints
+    """int64 (m,): the predicted track that it would continue, -1 for births."""
 
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """Candidates, and the best set of them that a search found.
-
-    Attributes
-    ----------
-    evidence
-        The frame's evidence.
-    pool
-        The candidates.
-    bodies
-        The same in the views that deliver boxes.
-    problem
-        The same as arrays, for the kernels.
-    members : int64 (n,)
-        The chosen candidates.
-    """
+    """Candidates, and the best set of them that a search found."""
 
     evidence: FrameEvidence
+    """The frame's evidence."""
     pool: Candidates
+    """The candidates."""
     bodies: ProjectedBodies
+    """The same in the views that deliver boxes."""
     problem: DetectionProblem
+    """The same as arrays, for the kernels."""
     members: Ints
+    """int64 (n,): the chosen candidates."""
 
     @classmethod
     def of_search(

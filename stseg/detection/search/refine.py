@@ -28,22 +28,15 @@ _MINIMUM_BOX_LOG_LIKELIHOOD = -8.0
 
 @dataclass(frozen=True)
 class EvidenceAssignment:
-    """Boxes and pixels assigned to each of some people.
-
-    Attributes
-    ----------
-    box : int64 (view, person)
-        The box of each; -1 for none, and in views with pixels.
-    pixels : sequence of int16 (v, u), one a view
-        The number of the person that each raster pixel is assigned to, -1 for none: those are open to everyone. Not
-        read for views with boxes.
-    number : int64 (person,)
-        The number of each, by which pixels name them; others have numbers, too.
-    """
+    """Boxes and pixels assigned to each of some people."""
 
     box: Ints
+    """int64 (view, person): the box of each; -1 for none, and in views with pixels."""
     pixels: Sequence[Shorts]
+    """sequence of int16 (v, u), one a view: the number of the person that each raster pixel is assigned to, -1 for
+    none: those are open to everyone. Not read for views with boxes."""
     number: Ints
+    """int64 (person,): the number of each, by which pixels name them; others have numbers, too."""
 
     @classmethod
     def of_all(cls, box: Ints, pixels: Sequence[Shorts]) -> EvidenceAssignment:
@@ -57,20 +50,16 @@ class EvidenceAssignment:
 
 @dataclass(frozen=True)
 class RefinedPlaces:
-    """Marginal posteriors of people's places and heights.
-
-    Attributes
-    ----------
-    ground, covariance : float64 (n, 2), (n, 2, 2)
-        Marginalised over height; metres, square metres.
-    height, height_variance : float64 (n,)
-        Marginalised over place, under the population prior; metres, square metres.
-    """
+    """Marginal posteriors of people's places and heights."""
 
     ground: Floats
+    """float64 (n, 2): place, marginalised over height, metres."""
     covariance: Floats
+    """float64 (n, 2, 2): covariance of the place, marginalised over height, square metres."""
     height: Floats
+    """float64 (n,): marginalised over place, under the population prior, metres."""
     height_variance: Floats
+    """float64 (n,): variance of the height, marginalised likewise, square metres."""
 
 
 def refine(

@@ -17,24 +17,16 @@ from stseg.records.sizes import Sizes
 
 @dataclass(frozen=True)
 class RefinedPeople:
-    """People at the means of their posteriors.
-
-    Attributes
-    ----------
-    pool
-        Places, heights by this frame alone (a track's height would confirm itself), and widths.
-    covariance : float64 (n, 2, 2)
-        Covariance of each place, square metres.
-    sizes
-        Size posteriors of this frame alone, under the population prior.
-    track_sizes
-        Size posteriors of all frames so far.
-    """
+    """People at the means of their posteriors."""
 
     pool: Candidates
+    """Places, heights by this frame alone (a track's height would confirm itself), and widths."""
     covariance: Floats
+    """float64 (n, 2, 2): covariance of each place, square metres."""
     sizes: Sizes
+    """Size posteriors of this frame alone, under the population prior."""
     track_sizes: Sizes
+    """Size posteriors of all frames so far."""
 
 
 def moved_members(estimate: MapEstimate) -> Candidates:

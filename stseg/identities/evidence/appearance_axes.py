@@ -61,21 +61,16 @@ def independent_frames(
 
 @dataclass(frozen=True)
 class _Probes:
-    """Parts of tracklets, and of each the people who were there at its time: one is its own.
-
-    Attributes
-    ----------
-    rows
-        Of each part.
-    probe, person : int64 (pair,)
-    same : bool (pair,)
-        Whether the person is the part's own.
-    """
+    """Parts of tracklets, and of each the people who were there at its time: one is its own."""
 
     rows: list[Ints]
+    """Rows of each part."""
     probe: Ints
+    """int64 (pair,): the part."""
     person: Ints
+    """int64 (pair,): one of the people."""
     same: Flags
+    """bool (pair,): whether the person is the part's own."""
 
     @classmethod
     def of(cls, frame: Ints, tracklets: Sequence[Ints], people: Sequence[Ints]) -> _Probes:

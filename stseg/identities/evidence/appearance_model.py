@@ -34,21 +34,14 @@ _UNIT_PRIOR = SizePrior(1.0, 1.0)
 
 @dataclass(frozen=True)
 class LearnedAppearance:
-    """Appearance along a few axes.
-
-    Attributes
-    ----------
-    value : float64 (n, axis)
-        Of each row, nan where unknown.
-    model
-        Statistics of each axis.
-    colours
-        The last of the axes: those of colours; None where colours say nothing.
-    """
+    """Appearance along a few axes."""
 
     value: Floats
+    """float64 (n, axis): of each row, nan where unknown."""
     model: SizeModel
+    """Statistics of each axis."""
     colours: Axes | None = None
+    """The last of the axes: those of colours; None where colours say nothing."""
 
     @classmethod
     def nothing(cls, rows: int) -> LearnedAppearance:

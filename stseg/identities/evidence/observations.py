@@ -24,15 +24,7 @@ _LEAST_PLACE_ERROR = 0.05
 
 
 class ObservedRows(NamedTuple):
-    """Rows of a run for kernels.
-
-    Attributes
-    ----------
-    ground, variance, previous, certain, inside, precision, information
-        As of `Observations`.
-    birth, sign : int64 (n,)
-        Numbers drawn at random for each birth, and for each row, of 62 bits.
-    """
+    """Rows of a run for kernels; all but `birth` and `sign` as of `Observations`."""
 
     ground: Floats
     variance: Floats
@@ -42,47 +34,37 @@ class ObservedRows(NamedTuple):
     precision: Floats
     information: Floats
     birth: Ints
+    """int64 (n,): a number for each birth, drawn at random, of 62 bits."""
     sign: Ints
+    """int64 (n,): a number for each row, drawn at random, of 62 bits."""
 
 
 @dataclass(frozen=True)
 class Observations:
-    """Rows of a run, frame by frame.
-
-    Attributes
-    ----------
-    order : int64 (n,)
-        Index of each observation in the trajectory.
-    start : int64 (frame + 1,)
-        First observation of each frame that has rows.
-    seconds : float64 (frame,)
-    ground : float64 (n, 2)
-        Metres.
-    variance : float64 (n,)
-        Of each coordinate, square metres.
-    previous : int64 (n,)
-        The observation before in the same filter track, -1 for none.
-    certain : bool (n,)
-        Whether the observation continues its filter track without doubt, far from all others.
-    inside : float64 (n,)
-        How far inside the area: 0 at the border, 1 from `detection.border_width` on.
-    precision, information : float64 (n, size)
-        Inverse variance of each size, and that times its deviation from the population's mean.
-    room
-        Distance below which two bodies overlap, metres.
-    """
+    """Rows of a run, frame by frame."""
 
     order: Ints
+    """int64 (n,): index of each observation in the trajectory."""
     start: Ints
+    """int64 (frame + 1,): first observation of each frame that has rows."""
     seconds: Floats
+    """float64 (frame,)."""
     ground: Floats
+    """float64 (n, 2): metres."""
     variance: Floats
+    """float64 (n,): variance of each coordinate, square metres."""
     previous: Ints
+    """int64 (n,): the observation before in the same filter track, -1 for none."""
     certain: Flags
+    """bool (n,): whether the observation continues its filter track without doubt, far from all others."""
     inside: Floats
+    """float64 (n,): how far inside the area: 0 at the border, 1 from `detection.border_width` on."""
     precision: Floats
+    """float64 (n, size): inverse variance of each size."""
     information: Floats
+    """float64 (n, size): the precision times the deviation of the size from the population's mean."""
     room: float
+    """Distance below which two bodies overlap, metres."""
 
     def birth(self) -> Ints:
         """A number of each filter track and second, of which births are one, int64 (n,)."""

@@ -32,25 +32,18 @@ _EVIDENCE_LIMIT = 500.0
 
 @dataclass(frozen=True)
 class Return:
-    """A visit that takes the identity of an earlier one.
-
-    Attributes
-    ----------
-    frame
-        First frame of the visit.
-    identity, visit
-        The identity that it takes, and its own.
-    probability
-        That both are one person's.
-    absence
-        Frames since that person was there; None for a person of an earlier recording.
-    """
+    """A visit that takes the identity of an earlier one."""
 
     frame: int
+    """First frame of the visit."""
     identity: int
+    """The identity that it takes."""
     visit: int
+    """The visit's own identity."""
     probability: float
+    """Probability that both are one person's."""
     absence: int | None
+    """Frames since that person was there; None for a person of an earlier recording."""
 
 
 @dataclass
@@ -144,26 +137,20 @@ def _return(visits: Visits, visit: int, person: int, probability: float, people:
 
 @dataclass(frozen=True)
 class Visits:
-    """Stays of people, each under an identity of its own.
-
-    Attributes
-    ----------
-    identity : int64 (visit,)
-        In the order of `first`.
-    first, last : int64 (visit,)
-        Frames.
-    precision, information : float64 (visit, size)
-        Inverse variance of the visit's mean of each size and axis of appearance, and that times the mean.
-    lasting : float64 (size,)
-        Variance of what lasts as long as a visit, which the precision counts.
-    """
+    """Stays of people, each under an identity of its own."""
 
     identity: Ints
+    """int64 (visit,): identities, in the order of `first`."""
     first: Ints
+    """int64 (visit,): first frame."""
     last: Ints
+    """int64 (visit,): last frame."""
     precision: Floats
+    """float64 (visit, size): inverse variance of the visit's mean of each size and axis of appearance."""
     information: Floats
+    """float64 (visit, size): the precision times the mean."""
     lasting: Floats
+    """float64 (size,): variance of what lasts as long as a visit, which the precision counts."""
 
     def __len__(self) -> int:
         return len(self.identity)

@@ -26,21 +26,14 @@ _SOLITARY_TIME = 1.0
 
 @dataclass(frozen=True)
 class AnsweredRows:
-    """Constraints and deletions of rows by answers.
-
-    Attributes
-    ----------
-    constraints
-        Pairs of rows that are one person, or two.
-    places
-        Where the answer of each constraint stands, for errors.
-    deleted : bool (row,)
-        Rows that are no person.
-    """
+    """Constraints and deletions of rows by answers."""
 
     constraints: Constraints
+    """Pairs of rows that are one person, or two."""
     places: list[str]
+    """Where the answer of each constraint stands, for errors."""
     deleted: Flags
+    """bool (row,): rows that are no person."""
 
     @classmethod
     def of_table(cls, table: Rows, number: int) -> AnsweredRows:

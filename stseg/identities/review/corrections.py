@@ -20,47 +20,35 @@ ACTIONS = ("keep", "swap", "join", "split", "delete", "name")
 
 @dataclass(frozen=True)
 class Answer:
-    """One answer about the tracks of a run; ids and frames are those of that run.
-
-    Attributes
-    ----------
-    place
-        Where it stands, for errors.
-    action
-        keep: nothing changes. swap: from `frame` on, `track` and `other` exchange identities. join: `other` continues
-        `track`. split: from `frame` on, `track` is another person. delete: `track` is no person (from `frame` on, where
-        one is given). name: the person is called `name`.
-    track, other
-        Track ids; 0 for none.
-    frame
-        None for the whole track.
-    name
-    """
+    """One answer about the tracks of a run; ids and frames are those of that run."""
 
     place: str
+    """Where it stands, for errors."""
     action: str
+    """keep: nothing changes. swap: from `frame` on, `track` and `other` exchange identities. join: `other` continues
+    `track`. split: from `frame` on, `track` is another person. delete: `track` is no person (from `frame` on, where one
+    is given). name: the person is called `name`."""
     track: int
+    """Track id; 0 for none."""
     other: int = 0
+    """Track id; 0 for none."""
     frame: int | None = None
+    """None for the whole track."""
     name: str = ""
 
 
 @dataclass(frozen=True)
 class Corrections:
-    """New identities of the pieces of all tracks.
-
-    Attributes
-    ----------
-    track, start, identity : int64 (n,)
-        For each piece, by track, then start: the run's id, its first frame, and the corrected id, 0 where deleted.
-    names
-        Names by corrected id.
-    """
+    """New identities of the pieces of all tracks, by track, then start."""
 
     track: Ints
+    """int64 (n,): the run's id of each piece."""
     start: Ints
+    """int64 (n,): first frame of each piece."""
     identity: Ints
+    """int64 (n,): corrected id of each piece, 0 where deleted."""
     names: dict[int, str]
+    """Names by corrected id."""
 
     def map(self, track: Ints, frame: Ints) -> Ints:
         """Corrected ids of rows, int64 (n,); ids of no track (0, for background) stay."""

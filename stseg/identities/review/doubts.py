@@ -30,27 +30,21 @@ _MARGIN_LIMIT = 12.0
 
 @dataclass(frozen=True)
 class Doubt:
-    """A decision that may be wrong.
-
-    Attributes
-    ----------
-    question
-        "encounter": were two tracks swapped; "gap": does one track continue another; "birth": does a track that begins
-        beside another continue the person of that one; "false": is a track a person.
-    track, other
-        Ids; 0 for none.
-    first, last
-        Frames of the decision.
-    margin
-        Evidence for the decision against its alternative, nats; small is doubtful.
-    """
+    """A decision that may be wrong."""
 
     question: str
+    """"encounter": were two tracks swapped; "gap": does one track continue another; "birth": does a track that begins
+    beside another continue the person of that one; "false": is a track a person."""
     track: int
+    """Id; 0 for none."""
     other: int
+    """Id; 0 for none."""
     first: int
+    """First frame of the decision."""
     last: int
+    """Last frame of the decision."""
     margin: float
+    """Evidence for the decision against its alternative, nats; small is doubtful."""
 
 
 def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> list[Doubt]:

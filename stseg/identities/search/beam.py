@@ -36,23 +36,16 @@ _SLOT_STEP = 4
 
 
 class Frames(NamedTuple):
-    """The frames of a run.
-
-    Attributes
-    ----------
-    start : int64 (frame + 1,)
-        First row of each.
-    seconds : float64 (frame,)
-    bend : float64 (frame,)
-        Variance of a walk, since the frame before, from the straight path, square metres.
-    room
-        Distance below which two bodies overlap, metres.
-    """
+    """The frames of a run."""
 
     start: Ints
+    """int64 (frame + 1,): first row of each."""
     seconds: Floats
+    """float64 (frame,)."""
     bend: Floats
+    """float64 (frame,): variance of a walk, since the frame before, from the straight path, square metres."""
     room: float
+    """Distance below which two bodies overlap, metres."""
 
 
 @kernel

@@ -36,38 +36,25 @@ _BLOCK = 256
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """Extent of the search.
-
-    Attributes
-    ----------
-    hypotheses
-        Number that is kept.
-    longest
-        Longest time unseen, seconds.
-    lag
-        Time after which names are final, seconds.
-    """
+    """Extent of the search."""
 
     hypotheses: int
+    """Number that is kept."""
     longest: float
+    """Longest time unseen, seconds."""
     lag: float
+    """Time after which names are final, seconds."""
 
 
 class _Choices(NamedTuple):
-    """The hypotheses after each of some frames.
-
-    Attributes
-    ----------
-    number : int64 (frame,)
-    parent : int64 (frame, hypothesis)
-        The hypothesis before.
-    names : int64 (frame, hypothesis, row)
-        Of the frame's rows.
-    """
+    """The hypotheses after each of some frames."""
 
     number: Ints
+    """int64 (frame,)."""
     parent: Ints
+    """int64 (frame, hypothesis): the hypothesis before."""
     names: Ints
+    """int64 (frame, hypothesis, row): of the frame's rows."""
 
     @classmethod
     def empty(cls, frames: int, hypotheses: int, rows: int) -> _Choices:
@@ -119,18 +106,12 @@ class _History:
 
 @dataclass(frozen=True)
 class BestHypothesis:
-    """The best hypothesis found.
-
-    Attributes
-    ----------
-    name : int64 (n,)
-        Identity of each observation, named by its first observation.
-    score
-        Nats.
-    """
+    """The best hypothesis found."""
 
     name: Ints
+    """int64 (n,): identity of each observation, named by its first observation."""
     score: float
+    """Nats."""
 
 
 def search_identities(

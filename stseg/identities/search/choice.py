@@ -26,23 +26,18 @@ KEY_BITS = (1 << 63) - 1
 
 
 class Present(NamedTuple):
-    """People in each hypothesis before a frame, for keys of the hypotheses after it.
-
-    Attributes
-    ----------
-    name, birth : int64 (hypothesis, slot)
-        First row of each identity, -1 for none, and the number of its birth.
-    kin, unseen : int64 (hypothesis, slot)
-        Number of each identity in other hypotheses, too, and its term of the key where it has no row of the frame.
-    key : int64 (hypothesis,)
-        Key by the best assignment; -1 where it is not filled.
-    """
+    """People in each hypothesis before a frame, for keys of the hypotheses after it."""
 
     name: Ints
+    """int64 (hypothesis, slot): first row of each identity, -1 for none."""
     birth: Ints
+    """int64 (hypothesis, slot): number of its birth."""
     kin: Ints
+    """int64 (hypothesis, slot): number of each identity in other hypotheses, too."""
     unseen: Ints
+    """int64 (hypothesis, slot): its term of the key where it has no row of the frame."""
     key: Ints
+    """int64 (hypothesis,): key by the best assignment; -1 where it is not filled."""
 
 
 @kernel

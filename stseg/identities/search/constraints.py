@@ -15,19 +15,14 @@ from stseg.kernels.accelerate import kernel, part
 
 @dataclass(frozen=True)
 class Constraints:
-    """Pairs of rows of which it is known whether they are one person.
-
-    Attributes
-    ----------
-    earlier, later : int64 (constraint,)
-        Rows; the frame of the first lies before that of the second.
-    same : bool (constraint,)
-        One person, or two.
-    """
+    """Pairs of rows of which it is known whether they are one person."""
 
     earlier: Ints
+    """int64 (constraint,): first row, of a frame before that of the second."""
     later: Ints
+    """int64 (constraint,): second row."""
     same: Flags
+    """bool (constraint,): one person, or two."""
 
     def __len__(self) -> int:
         return len(self.same)
@@ -66,23 +61,18 @@ NO_CONSTRAINTS = Constraints.of([], [])
 
 @dataclass(frozen=True)
 class KnownPeople:
-    """Observations that constraints name: those that are one person, and pairs of people that are two.
-
-    Attributes
-    ----------
-    observation, person : int64 (k,)
-        Observations, rising, and the person of each.
-    other : bool (person, person)
-        Who are two; who is there in one frame is, too.
-    first, last : int64 (person,)
-        First and last of the observations.
-    """
+    """Observations that constraints name: those that are one person, and pairs of people that are two."""
 
     observation: Ints
+    """int64 (k,): observations, rising."""
     person: Ints
+    """int64 (k,): person of each observation."""
     other: Flags
+    """bool (person, person): pairs that are two people; people of one frame are, too."""
     first: Ints
+    """int64 (person,): first of the observations."""
     last: Ints
+    """int64 (person,): last of the observations."""
 
     @classmethod
     def of(cls, constraints: Constraints, frame: Ints) -> KnownPeople:
@@ -127,25 +117,17 @@ class KnownPeople:
 
 
 class BoundPeople(NamedTuple):
-    """People of constraints.
-
-    Attributes
-    ----------
-    observation, person, other, first, last
-        As of `KnownPeople`.
-    start : int64 (frame + 1,)
-        The first of the named observations from each frame on.
-    binding : int64 (person,)
-        The last observation that depends on the identity of each.
-    """
+    """People of constraints; `observation`, `person`, `other`, `first` and `last` are as of `KnownPeople`."""
 
     observation: Ints
     person: Ints
     start: Ints
+    """int64 (frame + 1,): the first of the named observations from each frame on."""
     other: Flags
     first: Ints
     last: Ints
     binding: Ints
+    """int64 (person,): the last observation that depends on the identity of each."""
 
 
 @part

@@ -32,21 +32,14 @@ CONTRADICTION = 1e4
 
 
 class RowCosts(NamedTuple):
-    """Costs of the rows of a frame, nats.
-
-    Attributes
-    ----------
-    cost : float64 (past, row)
-        As those of each past.
-    follower : int64 (past,)
-        The row that certainly follows each, -1 for none.
-    begun : float64 (row,)
-        As a new person.
-    """
+    """Costs of the rows of a frame, nats."""
 
     cost: Floats
+    """float64 (past, row): as those of each past."""
     follower: Ints
+    """int64 (past,): the row that certainly follows each, -1 for none."""
     begun: Floats
+    """float64 (row,): as a new person."""
 
 
 @kernel
@@ -108,22 +101,16 @@ _LEAST_PROBABILITY = 1e-10
 
 
 class Crossings(NamedTuple):
-    """Costs of a frame, by pairs of near rows.
-
-    Attributes
-    ----------
-    before
-        First row of the frame before.
-    then : int64 (row before, row before), now : int64 (row, row)
-        Number of each ordered pair of near rows, -1 for those that are apart.
-    cost : float64 (pair now, pair before)
-        Nats.
-    """
+    """Costs of a frame, by pairs of near rows."""
 
     before: int
+    """First row of the frame before."""
     then: Ints
+    """int64 (row before, row before): number of each ordered pair of near rows."""
     now: Ints
+    """int64 (row, row): -1 for those that are apart."""
     cost: Floats
+    """float64 (pair now, pair before): nats."""
 
 
 @kernel

@@ -29,30 +29,23 @@ from stseg.kernels.linear_assignment import fill_assignment_of_least_cost
 
 
 class Extension(NamedTuple):
-    """The identities of a hypothesis, and the rows of a frame.
-
-    Attributes
-    ----------
-    slot, name, last : int64 (identity + 1,)
-        Slot, first and last row of each; -1 for a new one.
-    cost : float64 (row, identity + 1)
-        Nats.
-    assigned : int64 (row,)
-        The best assignment.
-    has_row : bool (identity + 1,)
-        Whether a row has each identity by the best assignment; never of a new one.
-    doubtful : int64 (k,)
-        Rows that do not certainly follow their track, rising; all others have the identity that they follow, or a new
-        one where there is none, and no other cost is known of them.
-    """
+    """The identities of a hypothesis, and the rows of a frame."""
 
     slot: Ints
+    """int64 (identity + 1,): slot of each; -1 for a new one."""
     name: Ints
+    """int64 (identity + 1,): first row of each; -1 for a new one."""
     last: Ints
+    """int64 (identity + 1,): last row of each; -1 for a new one."""
     cost: Floats
+    """float64 (row, identity + 1): nats."""
     assigned: Ints
+    """int64 (row,): the best assignment."""
     has_row: Flags
+    """bool (identity + 1,): whether a row has each identity by the best assignment; never of a new one."""
     doubtful: Ints
+    """int64 (k,): rows that do not certainly follow their track, rising; all others have the identity that they follow,
+    or a new one where there is none, and no other cost is known of them."""
 
 
 @kernel
@@ -180,19 +173,13 @@ def fill_least(one: Extension, identities: int, slots: int) -> None:
 
 
 class Alternatives(NamedTuple):
-    """Extended hypotheses.
-
-    Attributes
-    ----------
-    change : int64 (alternative, 5)
-        Hypothesis, row, its slot, other row, its slot, where they differ from the best assignment; -1 for no row, and
-        for a new person.
-    value : float64 (alternative,)
-        Score, nats.
-    """
+    """Extended hypotheses."""
 
     change: Ints
+    """int64 (alternative, 5): hypothesis, row, its slot, other row, its slot, where they differ from the best
+    assignment; -1 for no row, and for a new person."""
     value: Floats
+    """float64 (alternative,): score, nats."""
 
 
 @kernel

@@ -20,21 +20,14 @@ FREE = -1
 
 
 class Hypotheses(NamedTuple):
-    """Hypotheses, the best first; each holds identities in slots.
-
-    Attributes
-    ----------
-    score : float64 (hypothesis,)
-        Nats.
-    past : int64 (hypothesis, slot)
-        Which of the pasts each identity has, `FREE` where there is none.
-    bound : int64 (hypothesis, person)
-        Identity of each person of the constraints, -1 before the first observation.
-    """
+    """Hypotheses, the best first; each holds identities in slots."""
 
     score: Floats
+    """float64 (hypothesis,): nats."""
     past: Ints
+    """int64 (hypothesis, slot): which of the pasts each identity has, `FREE` where there is none."""
     bound: Ints
+    """int64 (hypothesis, person): identity of each person of the constraints, -1 before the first observation."""
 
     @classmethod
     def empty(cls, number: int, slots: int, people: int) -> Hypotheses:
@@ -127,32 +120,24 @@ def _slot_for_new(before: Ints, after: Ints, slots: int, seconds: Floats, now: f
 
 
 class Pasts(NamedTuple):
-    """Identities as different hypotheses know them.
-
-    Attributes
-    ----------
-    name, last : int64 (past,)
-        First and last observation of each identity; the first is its name.
-    seconds : float64 (past,)
-        Time of the last observation.
-    state : float64 (past, 4)
-        x, y, vx, vy, in metres and metres per second.
-    covariance : float64 (past, 3)
-        Of either axis: place, place and velocity, velocity.
-    precision, information : float64 (past, size)
-        Sums over the identity's observations.
-    evidence : float64 (past, size)
-        Of these sums for one person, nats; see `size_evidence`.
-    """
+    """Identities as different hypotheses know them."""
 
     name: Ints
+    """int64 (past,): first observation of each identity, which is its name."""
     last: Ints
+    """int64 (past,): last observation of each identity."""
     seconds: Floats
+    """float64 (past,): time of the last observation."""
     state: Floats
+    """float64 (past, 4): x, y, vx, vy, in metres and metres per second."""
     covariance: Floats
+    """float64 (past, 3): of either axis: place, place and velocity, velocity."""
     precision: Floats
+    """float64 (past, size): sums over the identity's observations."""
     information: Floats
+    """float64 (past, size): sums over the identity's observations."""
     evidence: Floats
+    """float64 (past, size): of these sums for one person, nats; see `size_evidence`."""
 
     @classmethod
     def empty(cls, number: int, sizes: int) -> Pasts:
@@ -235,32 +220,25 @@ def correct_place(
 
 
 class Rules(NamedTuple):
-    """Constants of the search.
-
-    Attributes
-    ----------
-    birth, absence
-        Costs of a birth or a death inside the area, nats, and of being unseen, nats per second.
-    least
-        Least evidence of a place against an identity, nats.
-    longest
-        Longest time unseen, seconds.
-    alternative_loss, beam_loss
-        Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats.
-    turn, pace
-        Variances of the velocity gained in a second, and of that of a new person.
-    spread, most_against : float64 (size,)
-        Variance of each size among people, and greatest evidence of an appearance for a new person, nats times
-        variance.
-    """
+    """Constants of the search."""
 
     birth: float
+    """Cost of a birth or a death inside the area, nats."""
     absence: float
+    """Cost of being unseen, nats per second."""
     least: float
+    """Least evidence of a place against an identity, nats."""
     longest: float
+    """Longest time unseen, seconds."""
     alternative_loss: float
+    """Greatest loss of an alternative in one frame, nats."""
     beam_loss: float
+    """Greatest loss of a hypothesis against the best, nats."""
     turn: float
+    """Variance of the velocity gained in a second."""
     pace: float
+    """Variance of the velocity of a new person."""
     spread: Floats
+    """float64 (size,): variance of each size among people."""
     most_against: Floats
+    """float64 (size,): greatest evidence of an appearance for a new person, nats times variance."""

@@ -20,21 +20,18 @@ _VELOCITY_STEPS = 4
 
 @dataclass(frozen=True)
 class DetectionHistory:
-    """Detections with their filter tracks; rows in any order, a track at most once a frame.
-
-    Attributes
-    ----------
-    frame, track : int64 (n,)
-        Frame of the recording; filter track.
-    ground, covariance, height : float64 (n, 2), (n, 2, 2), (n,)
-        Metres, square metres.
-    """
+    """Detections with their filter tracks; rows in any order, a track at most once a frame."""
 
     frame: Ints
+    """int64 (n,): frame of the recording."""
     track: Ints
+    """int64 (n,): filter track."""
     ground: Floats
+    """float64 (n, 2): metres."""
     covariance: Floats
+    """float64 (n, 2, 2): square metres."""
     height: Floats
+    """float64 (n,): metres."""
 
     def at(self, rows: Ints) -> DetectionHistory:
         """The given rows."""

@@ -16,24 +16,16 @@ from stseg.tracking.filter.assignment import assign, distances
 
 @dataclass
 class Tracklet:
-    """A window tracklet, at most one blob a frame: parallel lists, in the order of time.
-
-    Attributes
-    ----------
-    filter_track
-        Track of the filter (`TrackFilter`), 0 if none of the blobs holds a detection.
-    frames
-        Frame numbers of the recording.
-    blobs
-        Index of the blob in each frame.
-    ground : list of float64 (2,)
-        Metres.
-    """
+    """A window tracklet, at most one blob a frame: parallel lists, in the order of time."""
 
     filter_track: int
+    """Track of the filter (`TrackFilter`), 0 if none of the blobs holds a detection."""
     frames: list[int] = field(default_factory=list)
+    """Frame numbers of the recording."""
     blobs: list[int] = field(default_factory=list)
+    """Index of the blob in each frame."""
     ground: list[Floats] = field(default_factory=list)
+    """list of float64 (2,): metres."""
 
     def add(self, frame: int, blob: int, ground: Floats) -> None:
         """Append a blob of a later frame."""

@@ -32,18 +32,12 @@ class ActiveTrack:
 
 @dataclass(frozen=True)
 class WindowAssignment:
-    """Identities of one window.
-
-    Attributes
-    ----------
-    identity : list of int64 (blob,)
-        For each frame of the window, the track of each blob.
-    events
-        (frame, kind, id, other, reason) of the frames that the window commits.
-    """
+    """Identities of one window."""
 
     identity: list[Ints]
+    """list of int64 (blob,): for each frame of the window, the track of each blob."""
     events: list[tuple[int, str, int, int, str]]
+    """(frame, kind, id, other, reason) of the frames that the window commits."""
 
 
 @dataclass

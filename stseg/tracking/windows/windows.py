@@ -12,23 +12,18 @@ SHORTEST, LONGEST = 8, 30
 
 @dataclass(frozen=True)
 class Window:
-    """Half-open ranges of frames.
-
-    Attributes
-    ----------
-    index
-        Counted from frame 0 of the recording, whatever part is run.
-    solve_first, solve_stop
-        Frames of one cut.
-    commit_first, commit_stop
-        Frames that the window commits; these ranges partition the run.
-    """
+    """Half-open ranges of frames."""
 
     index: int
+    """Counted from frame 0 of the recording, whatever part is run."""
     solve_first: int
+    """First frame of one cut."""
     solve_stop: int
+    """End of the frames of one cut."""
     commit_first: int
+    """First frame that the window commits; the committed ranges partition the run."""
     commit_stop: int
+    """End of the frames that the window commits."""
 
 
 def window_length(frame_rate: float, config: TrackingConfig) -> tuple[int, int]:
