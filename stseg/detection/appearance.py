@@ -32,19 +32,10 @@ def appearance_rows(
 ) -> Rows:  # fmt: skip
     """APPEARANCE rows of a frame: for each view and person that it sees past others.
 
-    Parameters
-    ----------
-    frame
-    explanation
-        The frame's people.
-    tables
-        Projected bodies of each view.
-    axes : float64 (feature, FEATURES), or None
-        By which features of boxes are reduced (`stseg.records.principal_axes`); None to leave them out.
-    observations, evidence
-        Of each view, in the rig's order.
-    images
-        Colour frames of views that deliver boxes, of each view, None where it has none; empty where none has.
+    `explanation` holds the frame's people. Observations, evidence, and `tables` (projected bodies) are of each view, in
+    the rig's order. `axes` float64 (feature, FEATURES) reduce the features of boxes (`stseg.records.principal_axes`);
+    None leaves them out. `images` are the colour frames of views that deliver boxes: of each view, None where it has
+    none; empty where none has.
     """
     parts = []
     pictures = images or [None] * len(observations)

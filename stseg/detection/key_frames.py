@@ -50,12 +50,8 @@ def key_frame_interval(frame_rate: float, config: DetectionConfig) -> int:
 def followed_frame(tracks: MapEstimate, lattice_ground: Floats) -> Explanation | None:
     """The explanation of a frame by the best set of its predicted tracks; None where it is to be searched as a whole.
 
-    Parameters
-    ----------
-    tracks
-        That set, found among the predicted tracks alone.
-    lattice_ground : float64 (y, x, 2)
-        The birth lattice, metres.
+    `tracks` is that set, found among the predicted tracks alone; `lattice_ground` float64 (y, x, 2) the birth lattice,
+    metres.
     """
     if not (_are_separate(tracks) and _is_decided(tracks)):
         return None

@@ -51,22 +51,9 @@ class IdentityProblem:
     ) -> IdentityProblem:  # fmt: skip
         """The problem of a run; sizes and appearance are learned from it.
 
-        Parameters
-        ----------
-        trajectory : TRAJECTORY (n,)
-            In any order.
-        sizes
-            Of each row.
-        appearance : APPEARANCE (l,)
-            Of detections.
-        frame_rate
-            Frames per second.
-        border
-            Where people come and go.
-        config
-            The constants of all stages: body, motion, detection and tracking.
-        constraints
-            Pairs of rows that are one person, or two: identities from which appearance is learned obey them.
+        `trajectory` is TRAJECTORY (n,) in any order, `sizes` are those of each row, and `appearance` is APPEARANCE (l,)
+        of detections. `frame_rate` is in frames per second; people come and go at the border. The constraints are pairs
+        of rows that are one person, or two: identities from which appearance is learned obey them.
         """
         tracklets, tracking = isolated_tracklets(trajectory, frame_rate), config.tracking
         limits = SearchLimits(tracking.hypotheses, tracking.maximum_gap, tracking.identity_lag)
@@ -102,12 +89,8 @@ class IdentityProblem:
     def visits(self, identity: Ints, frame: Ints, known: Rows = NO_KNOWN_PEOPLE) -> Visits:
         """Sums of sizes and appearance over the visit of each identity, after those of people of earlier recordings.
 
-        Parameters
-        ----------
-        identity, frame : int64 (n,)
-            Of each row; identity 0 for none.
-        known : KNOWN_PERSON (k,)
-            People of earlier recordings.
+        `identity` and `frame` int64 (n,) are those of each row, identity 0 for none; `known` KNOWN_PERSON (k,) are the
+        people of earlier recordings.
         """
         order = self.observations.order
         precision, information = self.observations.precision, self.observations.information
@@ -122,14 +105,9 @@ class IdentityProblem:
         return visits.after(known["id"], number * precision, number * information)
 
     def score(self, constraints: Constraints, since: float, until: float) -> float:
-        """Score of the best identities of the rows between two times, nats.
+        """Score of the best identities of the rows from `since` until `until`, seconds: nats.
 
-        Parameters
-        ----------
-        constraints
-            Pairs of rows; those of which a row lies outside are left out.
-        since, until
-            Seconds.
+        Constraints are pairs of rows; those of which a row lies outside are left out.
         """
         start, stop = np.searchsorted(self.observations.seconds, (since, until)).tolist()
         part = self.observations.between(start, stop)

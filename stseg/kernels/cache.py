@@ -33,13 +33,7 @@ _COMPILING_FILES = tuple(_PACKAGE / "kernels" / name for name in ("accelerate.py
 
 
 class KernelFolder:
-    """Locator of a kernel's files, as numba asks for one.
-
-    Parameters
-    ----------
-    function, source
-        The kernel as plain Python, and its file.
-    """
+    """Locator of the files of a kernel (`function`, plain Python in the file `source`), as numba asks for one."""
 
     def __init__(self, function: Callable[..., object], source: str) -> None:
         self._line = function.__code__.co_firstlineno

@@ -32,15 +32,7 @@ _INLINED_OPTIONS = {"_nrt": False}
 
 
 class Kernel(CPUDispatcher):
-    """A kernel that Python and kernels call.
-
-    Parameters
-    ----------
-    function
-        The kernel as plain Python.
-    options
-        Numba's.
-    """
+    """A kernel that Python and kernels call, from plain Python and numba's options."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         inlined = _INLINED_OPTIONS if options.get("forceinline") else {}

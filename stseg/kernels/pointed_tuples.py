@@ -31,13 +31,7 @@ def pointed(fields: Fields) -> Fields:
 
 
 class Pointed(types.Type):
-    """The type of a named tuple by its address.
-
-    Parameters
-    ----------
-    fields
-        The type of the tuple.
-    """
+    """The type of a named tuple, whose own type is `fields`, by its address."""
 
     def __init__(self, fields: Any) -> None:
         self.fields = fields

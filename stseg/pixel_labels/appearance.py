@@ -134,23 +134,9 @@ def colour_log_ratios(
 ) -> Singles:
     """Log-ratio of a pixel's colour for a person to that for the mean of all who may cover it.
 
-    Parameters
-    ----------
-    appearance
-        Colours of the view's tracks.
-    likelihood
-        Prior shares of the frame's people.
-    rows
-        Their rows.
-    track : int64 (n,)
-        Their ids.
-    image : uint8 (v, u, 3)
-        Colours of the window.
-
-    Returns
-    -------
-    float32 (m,)
-        Nats, at the pixels of each person's rectangle; 0 where no other person may be.
+    float32 (m,), nats, at the pixels of each person's rectangle; 0 where no other person may be. `appearance` holds the
+    colours of the view's tracks, `likelihood` the prior shares of the frame's people, whose ids are `track` int64 (n,);
+    `image` uint8 (v, u, 3) holds the colours of the window.
     """
     place = np.searchsorted(appearance.track, track)
     density, ratio = np.zeros((2, len(likelihood.people.share)), np.float32)

@@ -40,18 +40,11 @@ def pixel_energy(
     config: LabelConfig,
     colour: Singles | None = None,
 ) -> PixelEnergy:
-    """Energy of an image window.
+    """Energy of an image window, which the label likelihood `prior` defines.
 
-    Parameters
-    ----------
-    prior
-        Label likelihood, which defines the window.
-    foreground : float32 (v, u)
-        q in the window.
-    across, down : int32 (v, u)
-        w to the next pixel in the row and in the column, quanta.
-    colour : float32 (m,)
-        a of each person at the pixels of the rectangle, nats; None without colours.
+    `foreground` float32 (v, u) is q in the window, `across` and `down` int32 (v, u) are w to the next pixel in the row
+    and in the column, quanta, and `colour` float32 (m,) is a of each person at the pixels of the rectangle, nats; None
+    without colours.
     """
     people, edge_sums = prior.people, _edge_sums(across, down)
     cost, outliers = np.empty(len(people.share), np.int64), config.outlier_rate / (len(people.edges) + 1)
@@ -135,17 +128,8 @@ def adjacency(difference: Floats, config: LabelConfig) -> Floats:
 def edge_costs(image: Bytes | None, shape: tuple[int, int], config: LabelConfig) -> tuple[Labels, Labels]:
     """Weights between each pixel and the next in its row, and between it and the one below.
 
-    Parameters
-    ----------
-    image : uint8 (v, u, 3)
-        None without colours: all pairs then have the mean weight at borders.
-    shape
-        Image size (v, u).
-
-    Returns
-    -------
-    int32 (v, u), int32 (v, u)
-        Quanta; 0 without a neighbour.
+    Both int32 (v, u), quanta; 0 without a neighbour. `image` is uint8 (v, u, 3), of the size `shape` (v, u), or None
+    without colours: all pairs then have the mean weight at borders.
     """
     across, down = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
     if image is None:

@@ -17,17 +17,7 @@ from stseg.pixel_labels.pixel_energy import admissible, edge_costs, most_likely_
 
 
 class ViewLabels:
-    """The labels of one view.
-
-    Parameters
-    ----------
-    camera
-        The view.
-    table
-        Its bodies.
-    config, body
-        The constants of the labels; sizes of people.
-    """
+    """The labels of one view of a camera with its table of bodies, by constants of the labels and sizes of people."""
 
     def __init__(self, camera: Camera, table: BodyTable, config: LabelConfig, body: BodyConfig) -> None:
         self.camera, self.table, self.config, self.body = camera, table, config, body
@@ -35,23 +25,11 @@ class ViewLabels:
     def label(
         self, people: PlacedPeople, foreground: Singles, image: Bytes | None, appearance: Appearance | None = None
     ) -> Labels:
-        """Person visible at each pixel.
+        """Person visible at each pixel, int32 (v, u): 1 + the index of the person, 0 for background.
 
-        Parameters
-        ----------
-        people
-            Places and heights of the frame's people.
-        foreground : float32 (v, u)
-            Probability of a person by the view's foreground, 0..1.
-        image : uint8 (v, u, 3)
-            Colours, or None.
-        appearance
-            Colours that the people's tracks wear in this view; None where they are not known.
-
-        Returns
-        -------
-        int32 (v, u)
-            1 + the index of the person, 0 for background.
+        `people` are the frame's, with places and heights; `foreground` float32 (v, u) is the probability of a person by
+        the view's foreground, 0..1; `image` uint8 (v, u, 3) its colours, or None. `appearance` holds the colours that
+        the people's tracks wear in this view; None where they are not known.
         """
         labels = np.zeros(foreground.shape, np.int32)
         likelihood = self.label_likelihood(people)

@@ -13,23 +13,9 @@ Selection = int | Flags | EllipsisType
 
 
 class Forgetting:
-    """Decaying sums of a session.
+    """Decaying sums of a session: weights and weighted sums of what was counted, in the unit of `add`.
 
-    Parameters
-    ----------
-    shape
-        Shape of the sums.
-    frame_rate
-        Frames per second.
-    memory
-        Time constant, seconds.
-    least_frames
-        Least time constant, frames.
-
-    Attributes
-    ----------
-    sums : float64
-        Weights and weighted sums of what was counted, in the unit of `add`.
+    `sums` float64 have the given shape. The time constant is `memory` seconds, and at least `least_frames` frames.
     """
 
     def __init__(self, shape: tuple[int, ...], frame_rate: float, memory: float, least_frames: float = 0.0) -> None:

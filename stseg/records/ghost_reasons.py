@@ -49,12 +49,8 @@ def ghost_reasons(candidates: Rows) -> GhostReasons:
     """Find the main reason against every ghost.
 
     Its evidence is the sum over the views, minus the prior cost of one more person, minus the evidence that people
-    already detected lose to it. The prior cost is the median, over the run's people, of the sum minus the evidence.
-
-    Parameters
-    ----------
-    candidates : rows (n,) with status, evidence, parts
-        As in the run file's /ghosts.
+    already detected lose to it. The prior cost is the median, over the run's people, of the sum minus the evidence. The
+    candidates are rows (n,) with status, evidence and parts, as in the run file's /ghosts.
     """
     parts = np.nan_to_num(candidates["parts"].astype(float))
     short = candidates["evidence"] - parts.sum(axis=1)

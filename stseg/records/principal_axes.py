@@ -12,12 +12,8 @@ from stseg.arrays import Floats, Singles
 def principal_axes(features: Sequence[Singles], number: int) -> Floats:
     """Axes of the greatest variance within cameras (Pearson 1901), float64 (feature, number or less).
 
-    Parameters
-    ----------
-    features : float32 (box, feature)
-        Of each camera; their means may differ.
-    number
-        Most axes.
+    `features` float32 (box, feature) are those of each camera; their means may differ. `number` is that of axes, at
+    most.
     """
     scatter = np.zeros((features[0].shape[1],) * 2)
     for camera_features in features:

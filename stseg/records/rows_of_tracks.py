@@ -8,12 +8,6 @@ from stseg.arrays import Ints
 
 
 def rows_of_tracks(ids: Ints) -> list[Ints]:
-    """Rows of each track, by rising id; each in the order of the rows.
-
-    Parameters
-    ----------
-    ids : int64 (n,)
-        Track of each row.
-    """
+    """Rows of each track (`ids` int64 (n,) of all rows), by rising id; each in the order of the rows."""
     order = np.argsort(ids, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(ids[order])) + 1) if len(order) else []

@@ -88,16 +88,9 @@ def fill_measures(
 ) -> bool:
     """Fill the measures of blobs, 0 everywhere before; whether any two blobs are beside each other.
 
-    Parameters
-    ----------
-    cells : int32 (y, x)
-        Blob of each ground cell, counted from 1; 0 for none.
-    track : int64 (n,)
-        Label of the cells of each blob.
-    label, log_odds : int32, float32 (plane, y, x)
-        Of each cell; nats.
-    ground, heights : float64 (y, x, 2), (plane,)
-        Metres.
+    `cells` int32 (y, x) is the blob of each ground cell, counted from 1, 0 for none; `track` int64 (n,) the label of
+    the cells of each blob. `label` int32 and `log_odds` float32 (plane, y, x), nats, are of each cell. `ground` float64
+    (y, x, 2) and `heights` float64 (plane,) are in metres.
     """
     weight = np.zeros(cells.shape)
     total, occupied, meet = np.zeros(len(track)), np.zeros(len(track)), False

@@ -22,20 +22,14 @@ def find_blobs(
     """Blobs of one frame.
 
     The cells of a track form one blob; unassigned cells one blob for each connected component on the ground. A ground
-    cell below cells of several labels goes to the one with the most mass above it. A detection without cells
-    is a blob of extent 0, since its existence is decided before the cut. Outside the area it is dropped.
+    cell below cells of several labels goes to the one with the most mass above it. A detection without cells is a blob
+    of extent 0, since its existence is decided before the cut. Outside the area it is dropped.
 
-    Parameters
-    ----------
-    label : int32 (plane, row, column)
-        Track of each cell of the patches, UNASSIGNED, or 0 for background.
-    log_odds : float32 (plane, row, column)
-        Log-odds of a person, nats; nan where no view sees the cell.
-    people_ground, people_track : float64 (n, 2), int64 (n,)
-        Detections of the frame, metres, and their tracks.
-    reach
-        Largest distance of a body's cells from its place, metres. A blob holds the detection of its
-        track if one of its cells is within half of it.
+    `label` int32 (plane, row, column) is the track of each cell of the patches, UNASSIGNED, or 0 for background;
+    `log_odds` float32 (plane, row, column) those of a person, nats, nan where no view sees the cell. `people_ground`
+    float64 (n, 2) are the detections of the frame, metres, and `people_track` int64 (n,) their tracks. `reach` is the
+    largest distance of a body's cells from its place, metres: a blob holds the detection of its track if one of its
+    cells is within half of it.
     """
     ground_label = np.zeros(label.shape[1:], np.int32)
     fill_ground_labels(label, log_odds, ground_label)

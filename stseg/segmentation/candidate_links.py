@@ -104,16 +104,9 @@ def _fill_near(
 ) -> int:  # fmt: skip
     """Fill pair (pair, 2), as far as it reaches, with candidates that may be linked; the number of these pairs.
 
-    Parameters
-    ----------
-    frame, ground, covariance
-        As of `WindowCandidates`.
-    span
-        Most frames between two that are linked.
-    noise
-        Variance of the distance between two places of a standing person, square metres.
-    speed
-        Standard deviation of a step, metres a frame.
+    `frame`, `ground` and `covariance` are as of `WindowCandidates`; `span` is the most frames between two that are
+    linked, `noise` the variance of the distance between two places of a standing person, square metres, and `speed` the
+    standard deviation of a step, metres a frame.
     """
     found = 0
     for i in range(len(frame)):

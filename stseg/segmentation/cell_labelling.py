@@ -65,20 +65,10 @@ def label_cells(
     places: CellPlaces,
     solver: Solver,
 ) -> WindowLabels:
-    """Label every occupied cell by a track or as UNASSIGNED.
+    """Label every cell of the minimum cut, `occupied` bool (time, plane, y, x), by a track or as UNASSIGNED.
 
-    Parameters
-    ----------
-    energy, occupied
-        Energy of the window and its minimum cut, bool (time, plane, y, x).
-    detections
-        Of its frames; their tracks are all among those predicted.
-    predicted
-        Places of tracks in its frames.
-    body
-        Extent of a body.
-    solver
-        Of the expansion moves.
+    `detections` are those of the window's frames; their tracks are all among those of `predicted`, the places of tracks
+    in these frames. `body` is the extent of a body, and `solver` that of the expansion moves.
     """
     subgraph = subset(energy, occupied)
     if not len(subgraph.cell):
@@ -122,13 +112,9 @@ def _occupants(
     reach: float,
     places: CellPlaces,
 ) -> tuple[Flags, Flags]:
-    """Tracks detected in each component, and tracks detected outside all components in a frame.
+    """Tracks detected in each component, bool (component, k), and outside all components in a frame, bool (time, k).
 
     A detection is in the components above the nearest occupied ground cell within half a reach.
-
-    Returns
-    -------
-    bool (component, k), bool (time, k)
     """
     occupied_by = np.zeros((int(component.max()) + 1, len(predicted.track)), bool)
     displaced = np.zeros_like(predicted.expected)

@@ -25,25 +25,12 @@ def motion_field(
     cell: float,
     ground: Floats,
 ) -> Ints:
-    """Motion of each cell until the next frame, in cells.
+    """Motion of each cell until the next frame, (dy, dx) in cells, int64 (y, x, 2).
 
-    Parameters
-    ----------
-    ground_now, ground_next : float64 (n, 2), (m, 2)
-        Detections of the two frames, metres.
-    track_now, track_next : int64 (n,), (m,)
-        Their tracks.
-    reach
-        Reach of a body's cells around its place, metres.
-    cell
-        Side of a cell, metres.
-    ground : float64 (y, x, 2)
-        Centres of the cells, metres.
-
-    Returns
-    -------
-    int64 (y, x, 2)
-        (dy, dx); zero out of reach of tracks detected in both frames.
+    It is zero out of reach of tracks detected in both frames. `ground_now` and `ground_next`, float64 (n, 2) and (m,
+    2), are detections of the two frames, metres, `track_now` and `track_next`, int64 (n,) and (m,), their tracks.
+    `reach` is that of a body's cells around its place, `cell` the side of a cell, and `ground` float64 (y, x, 2) the
+    centres of the cells, all in metres.
     """
     motion = np.zeros(ground.shape, np.int64)
     now, later = same_tracks(track_now, track_next)
@@ -57,20 +44,11 @@ def motion_field(
 
 
 def successor_cells(motion: Ints) -> Labels:
-    """Injective map of ground cells to those of the next frame.
+    """Injective map of ground cells to those of the next frame, int32 (time, y, x): y columns + x of that cell, or -1.
 
-    Of several cells with the same target a moving one wins over a still one: a body covers the floor. Of several moving
-    ones the first by y and x wins. Losers, and cells that leave the grid, have no successor.
-
-    Parameters
-    ----------
-    motion : int64 (time, y, x, 2)
-        Cells (dy, dx) moved until the next frame.
-
-    Returns
-    -------
-    int32 (time, y, x)
-        y columns + x of the cell in the next frame, or -1.
+    `motion` int64 (time, y, x, 2) is (dy, dx), in cells, until the next frame. Of several cells with the same target a
+    moving one wins over a still one: a body covers the floor. Of several moving ones the first by y and x wins. Losers,
+    and cells that leave the grid, have no successor.
     """
     successor = np.full(motion.shape[:3], -1, np.int32)
     _fill_successors(motion, successor)

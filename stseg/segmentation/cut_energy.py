@@ -28,14 +28,9 @@ def build_energy(
 ) -> GridEnergy:
     """Energy of a window.
 
-    Parameters
-    ----------
-    log_odds : float32 (time, plane, y, x)
-        u, nats; nan where no view sees the cell: unary term 0.
-    successor : int32 (time - 1, y, x)
-        See `stseg.segmentation.cell_motion.successor_cells`.
-    present : bool (y, x), or None
-        See `stseg.graphcut.grid_energy.GridEnergy`.
+    `log_odds` float32 (time, plane, y, x) are u, nats, nan where no view sees the cell: unary term 0. `successor` int32
+    (time - 1, y, x) is as of `stseg.segmentation.cell_motion.successor_cells`, `present` bool (y, x), or None, as of
+    `stseg.graphcut.grid_energy.GridEnergy`.
     """
     unary = np.empty(log_odds.shape, np.int32)
     fill_cut_unary(log_odds.reshape(-1), np.float32(_LOG_ODDS_LIMIT), np.float32(QUANTUM), unary.reshape(-1))

@@ -50,21 +50,11 @@ def track_shares(
     body: BodyShape,
     appearance: Floats | None = None,
 ) -> Floats:
-    """Share of each track in each cell, given that the cell is occupied.
+    """Share of each track and, last, of UNASSIGNED in each cell, given that the cell is occupied, float64 (n, k + 1).
 
-    Parameters
-    ----------
-    frame : int64 (n,)
-        Frame of each cell, counted from the window's first.
-    ground, height : float64 (n, 2), (n,)
-        Places and heights of the cells, metres.
-    appearance : float64 (n, k), optional
-        Log-likelihood ratio of a cell's appearance under each track against any body, nats.
-
-    Returns
-    -------
-    float64 (n, k + 1)
-        Of each track and, last, of UNASSIGNED; 0 outside the gate. Rows sum to one.
+    Shares are 0 outside the gate; rows sum to one. Of each cell are `frame` int64 (n,), counted from the window's
+    first, `ground` float64 (n, 2) and `height` float64 (n,), metres, and `appearance` float64 (n, k), optional: the
+    log-likelihood ratio of its appearance under each track against any body, nats.
     """
     disc = body.reach**2 / 4
     spread = predicted.covariance + disc * np.eye(2)
@@ -83,12 +73,8 @@ def track_shares(
 def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> LabelEnergy:
     """Energy of the division of a subgraph.
 
-    Parameters
-    ----------
-    unary : int32 or int64 (n,)
-        u of its cells, quanta.
-    share : float64 (n, k + 1)
-        As `track_shares` returns; column j has label j + 1. Labels with share 0 are inadmissible.
+    `unary` int32 or int64 (n,) is u of its cells, quanta. `share` float64 (n, k + 1) is as `track_shares` returns it;
+    column j has label j + 1. Labels with share 0 are inadmissible.
     """
     cell, column = np.nonzero(share)
     penalty = np.rint(-np.log(share[cell, column]) / QUANTUM).astype(np.int64)

@@ -157,12 +157,8 @@ def _cells(squares: slice, most: int) -> slice:
 def people_squares(grid: Grid, ground: Floats, ahead: Floats, reach: float) -> Flags:
     """Squares that people's cells cover on their way to the next frame, bool (square row, square column).
 
-    Parameters
-    ----------
-    ground, ahead : float64 (n, 2)
-        Their places in a frame and in the next, metres.
-    reach
-        Reach of a body's cells around its place, metres.
+    `ground` and `ahead` float64 (n, 2) are their places in a frame and in the next, and `reach` is that of a body's
+    cells around its place, all in metres.
     """
     squares = no_squares(grid)
     corners = np.sort(np.stack([grid.cell_of(ground), grid.cell_of(ahead)]), axis=0)

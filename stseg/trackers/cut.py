@@ -40,15 +40,7 @@ _ENDLESS = 1 << 62
 
 
 class CutTracker:
-    """Tracks by the minimum cut of overlapping windows.
-
-    Parameters
-    ----------
-    rig, config
-        The cameras and the grid; the constants of all stages.
-    first
-        The run's first frame.
-    """
+    """Tracks by the minimum cut of overlapping windows; see `TrackingMethod`."""
 
     final: ClassVar[bool] = False
 

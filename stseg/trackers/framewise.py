@@ -19,15 +19,7 @@ from stseg.tracking.filter.track_filter import TrackFilter
 
 
 class FramewiseTracker:
-    """Base of trackers that commit each frame from the places of its tracks.
-
-    Parameters
-    ----------
-    rig, config
-        The cameras and the grid; the constants of all stages.
-    first
-        The run's first frame.
-    """
+    """Base of trackers that commit each frame from the places of its tracks; see `TrackingMethod`."""
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config, self.frame = rig, config, first
@@ -70,21 +62,11 @@ class FrameTracker(FramewiseTracker):
 
 
 def _reached_cells(fused: FusedFrame, ground: Floats, ids: Ints, grid: Grid, reach: float) -> tuple[Labels, Floats]:
-    """Label the occupied cells of a frame with the nearest track within reach.
+    """Label the occupied cells of a frame with the nearest track within reach, metres.
 
-    Parameters
-    ----------
-    ground : float64 (n, 2)
-        Places of the tracks, metres.
-    ids : int64 (n,)
-        Track numbers.
-    reach
-        Metres.
-
-    Returns
-    -------
-    int32 (plane, y, x), float64 (n,)
-        Track ids of the cells, 0 for background; ground area of each track, square metres.
+    Returns the track ids of the cells, int32 (plane, y, x), 0 for background, and the ground area of each track,
+    float64 (n,), square metres. `ground` float64 (n, 2) are places of the tracks, metres, `ids` int64 (n,) their
+    numbers.
     """
     nearest = nearest_person(grid.ground, ground, reach)
     occupied = (fused.log_odds > 0) & (nearest >= 0)

@@ -65,15 +65,7 @@ class Commit:
 
 
 class TrackingMethod(Protocol):
-    """Takes frames in order, and returns committed frames as soon as they are final.
-
-    Parameters
-    ----------
-    rig, config
-        The cameras and the grid; the constants of all stages.
-    first
-        The run's first frame.
-    """
+    """Takes frames in order from the run's `first`, and returns committed frames as soon as they are final."""
 
     final: ClassVar[bool]
     """Whether committed identities are final; else global association decides them again over the whole run."""

@@ -34,12 +34,8 @@ class TrackPlaces(NamedTuple):
 def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats, views: Ints) -> Rows:
     """TRAJECTORY rows of one frame, sorted by id.
 
-    Parameters
-    ----------
-    extent : float64 (n,)
-        Ground area of each track, square metres.
-    views : int64 (n,)
-        Number of views that see the place.
+    `extent` float64 (n,) is the ground area of each track, square metres, `views` int64 (n,) the number of views that
+    see the place.
     """
     ids, ground, covariance, height, width, score = tracks
     rows = np.zeros(len(ids), TRAJECTORY)

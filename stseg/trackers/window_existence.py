@@ -46,15 +46,7 @@ class TrackedFrame:
 
 
 class WindowExistence:
-    """Revision of the frames of a window.
-
-    Parameters
-    ----------
-    rig, config
-        The scene, and the constants of all stages.
-    solver
-        Of the minimum cuts.
-    """
+    """Revision of the frames of a window of one scene, with a solver of the minimum cuts."""
 
     def __init__(self, rig: Rig, config: Config, solver: Solver) -> None:
         self.grid, self.solver, self.config = rig.grid, solver, config

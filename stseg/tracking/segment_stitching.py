@@ -49,13 +49,7 @@ class StitchedTracks:
 
 
 class Stitcher:
-    """Stitches segments in their order.
-
-    Parameters
-    ----------
-    patience
-        Longest undetected interval of a track, frames.
-    """
+    """Stitches segments in their order; `patience` is the longest undetected interval of a track, frames."""
 
     def __init__(self, patience: int = 0) -> None:
         self.issued, self.patience = 0, patience
@@ -133,16 +127,9 @@ def _deaths(rows: Rows, others: set[int], reason: str) -> list[_EventRow]:
 def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> None:
     """Rename the labels of a part of the volume to identities of the run, in place; dropped tracks become background.
 
-    Parameters
-    ----------
-    label : int32 (time, plane, y, x)
-        Names of the segment, 0 for background.
-    frames : int64 (time,)
-        Increasing.
-    rows : TRAJECTORY (n,)
-        Under names of the segment.
-    identity : int64 (n,)
-        Identity of each row in the run, 0 for a dropped track.
+    `label` int32 (time, plane, y, x) holds names of the segment, 0 for background, of `frames` int64 (time,),
+    increasing. `rows` TRAJECTORY (n,) are under names of the segment, and `identity` int64 (n,) is that of each row in
+    the run, 0 for a dropped track.
     """
     most = max(int(label.max(initial=0)), int(rows["id"].max(initial=0)))
     order = np.argsort(rows["frame"], kind="stable")

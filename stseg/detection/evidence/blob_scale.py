@@ -25,14 +25,8 @@ def blob_scales(
 ) -> Singles:
     """Raster pixels of the largest body that explains each pixel, float32 (view, v, u); 0 where none does, on rasters.
 
-    Parameters
-    ----------
-    rasters : float32 (view, v, u)
-        Log-odds of the views that deliver pixels, zero where a view is blind: nats.
-    extremes : float64 (view, 2)
-        The lowest and the highest of them.
-    lattice
-        The pillars of bodies.
+    `rasters` float32 (view, v, u) are log-odds of the views that deliver pixels, zero where a view is blind, nats;
+    `extremes` float64 (view, 2) the lowest and the highest of them; `lattice` holds the pillars of bodies.
     """
     scale, owner = np.empty(rasters.shape, np.float32), lattice.owner.reshape(-1)
     certain = float(np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate))

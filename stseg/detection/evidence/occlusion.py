@@ -24,23 +24,10 @@ def hiders_of(
 ) -> RaggedArray:
     """Occluders of each candidate, rising, with the share that each leaves visible of the box inside the image.
 
-    Parameters
-    ----------
-    bodies : float64 (view, candidate, 4)
-        left, top, right, bottom, pixels; nan where a view cannot see the place.
-    distance : float64 (view, candidate)
-        From the camera on the ground, metres.
-    sizes : float64 (view, 2)
-        Width and height of the images, pixels.
-    is_blind : bool (view,)
-        Views without occlusion.
-    base, base_candidates
-        The lists of the first candidates, and how many these are.
-
-    Returns
-    -------
-    Lists
-        The row of a candidate in a view is view * candidates + candidate.
+    `bodies` float64 (view, candidate, 4) are left, top, right, bottom, pixels, nan where a view cannot see the place;
+    `distance` float64 (view, candidate) is from the camera on the ground, metres; `sizes` float64 (view, 2) are widths
+    and heights of the images, pixels; `is_blind` bool (view,) marks views without occlusion. `base` are the lists of
+    the first `base_candidates`. The row of a candidate in a view is view * candidates + candidate.
     """
     views, candidates = distance.shape
     start = np.zeros(views * candidates + 1, np.int64)

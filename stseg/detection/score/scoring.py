@@ -60,20 +60,11 @@ def set_score(members: Ints, count: int, problem: DetectionProblem) -> float:
 
 @kernel
 def fill_set_scores(sets: Ints, whole: DetectionProblem, totals: Floats, view_evidence: Floats, tracks: Ints) -> None:
-    """Score some sets of as many candidates each.
+    """Score some sets int64 (set, member) of as many candidates each of the problem `whole`.
 
-    Parameters
-    ----------
-    sets : int64 (set, member)
-        Candidates.
-    whole
-        The problem.
-    totals : float64 (set,)
-        Filled with the scores, nats.
-    view_evidence : float64 (set, view, member)
-        Filled with the evidence of each view for each member, nats; views with boxes first.
-    tracks : int64 (set, member)
-        Filled with the predicted track that each member continues, -1 for none.
+    Filled are `totals` float64 (set,) with the scores, nats; `view_evidence` float64 (set, view, member) with the
+    evidence of each view for each member, nats, views with boxes first; and `tracks` int64 (set, member) with the
+    predicted track that each member continues, -1 for none.
     """
     problem, count = pointed(whole), sets.shape[1]
     for s in range(len(sets)):

@@ -29,14 +29,9 @@ def find_best_set(
 ) -> int:
     """Improve the set in place, starting from its first `count` members; returns its new size.
 
-    Parameters
-    ----------
-    members : int64 (candidate + 1,)
-        Indices of candidates; the first `count` are the set.
-    enumeration_limit
-        All subsets of groups of up to so many candidates are tried; 0 for a set that is searched again.
-    swap_sweeps
-        Sweeps of swap moves in larger groups, at most; 0 for simple moves alone.
+    `members` int64 (candidate + 1,) are indices of candidates. All subsets of groups of up to `enumeration_limit`
+    candidates are tried; 0 for a set that is searched again. Larger groups have at most `swap_sweeps` sweeps of swap
+    moves; 0 for simple moves alone.
     """
     return _improve(members, count, set_state(problem), enumeration_limit, swap_sweeps)
 

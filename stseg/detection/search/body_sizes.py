@@ -48,14 +48,8 @@ def body_sizes(
 ) -> Sizes:
     """E step: posteriors of people's sizes after one frame, under the population prior.
 
-    Parameters
-    ----------
-    places
-        Places, and the heights found with them: all that boxes show.
-    width : float64 (n,)
-        So far, metres.
-    own
-        Boxes and pixels assigned to each.
+    `places` are those of people, and the heights found with them: all that boxes show. `width` float64 (n,) is theirs
+    so far, metres, and `assignment` the boxes and pixels assigned to each.
     """
     found = Sizes.of_population(len(width), body)
     measured = [

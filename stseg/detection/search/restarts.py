@@ -23,14 +23,9 @@ _RESTART_LIMIT = 3
 
 
 def restarted(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
-    """The estimate, or a better one that was found from its strong members alone.
+    """The estimate of a search, or a better one that was found from its strong members alone.
 
-    Parameters
-    ----------
-    estimate
-        The result of a search.
-    lattice_ground : float64 (y, x, 2)
-        The lattice, metres.
+    `lattice_ground` float64 (y, x, 2) is the birth lattice, metres.
     """
     for _ in range(_RESTART_LIMIT):
         trial = better_of(estimate, _from_strong_members(estimate, lattice_ground))

@@ -32,21 +32,9 @@ def independent_frames(
 ) -> float:
     """Frames of one independent observation: with this number the pairs of a person and a tracklet are most probable.
 
-    Parameters
-    ----------
-    value : float64 (n, k)
-        Appearance of each row.
-    frame : int64 (n,)
-        Frame of each row.
-    tracklets
-        Rows of each isolated tracklet, in the order of time.
-    halves
-        Rows of the first and the second half of the time of each person.
-
-    Returns
-    -------
-    float
-        Infinite where no number is better than chance.
+    Infinite where no number is better than chance. `value` float64 (n, k) is the appearance and `frame` int64 (n,) the
+    frame of each row. `tracklets` are rows of each isolated tracklet, in the order of time, `halves` those of the first
+    and the second half of the time of each person.
     """
     cost = np.zeros(len(_FRAME_COUNTS))
     for side in range(2):

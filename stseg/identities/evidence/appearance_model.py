@@ -54,18 +54,9 @@ def learn_appearance(
 ) -> LearnedAppearance:
     """Learn how much the appearance of a recording's people tells of identity.
 
-    Parameters
-    ----------
-    frame : int64 (n,)
-        Frame of each row of a trajectory.
-    appearances : of float64 (n, k)
-        Features and colours of each row, see `row_looks`.
-    tracklets
-        Rows of each isolated tracklet, in the order of time.
-    person : int64 (n,)
-        Who each row is thought to be; some may be wrong.
-    frame_rate
-        Frames per second.
+    `frame` int64 (n,) is the frame of each row of a trajectory, of which `appearances` float64 (n, k) each are features
+    and colours (see `row_looks`), `tracklets` the rows of each isolated tracklet, in the order of time, and `person`
+    int64 (n,) the person that each row is thought to be; some may be wrong. `frame_rate` is in frames per second.
     """
 
     def learned(value: Floats) -> LearnedAppearance:

@@ -106,22 +106,10 @@ class Observations:
 def observe(
     trajectory: Rows, sizes: Floats, model: SizeModel, frame_rate: float, border: Border, config: Config
 ) -> Observations:
-    """Observations of a trajectory.
+    """Observations of a trajectory, TRAJECTORY (n,) in any order.
 
-    Parameters
-    ----------
-    trajectory : TRAJECTORY (n,)
-        In any order.
-    sizes : float64 (n, size)
-        Of each row, nan where unmeasured.
-    model
-        Their noise and spread.
-    frame_rate
-        Frames per second.
-    border
-        Where people come and go.
-    config
-        The constants of all stages.
+    `sizes` float64 (n, size) are those of each row, nan where unmeasured, `model` their noise and spread. `frame_rate`
+    is in frames per second; people come and go at the border; `config` holds the constants of all stages.
     """
     order = np.lexsort((trajectory["id"], trajectory["frame"]))
     rows = trajectory[order]

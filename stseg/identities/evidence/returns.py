@@ -76,18 +76,10 @@ class _People:
 
 
 def find_returns(visits: Visits, spread: Floats, least: float, different: Ints = NO_PAIRS) -> list[Return]:
-    """Visits of people who were there before.
+    """Visits, given in the order of time, of people who were there before.
 
-    Parameters
-    ----------
-    visits
-        In the order of time.
-    spread : float64 (size,)
-        Variance of each size among people.
-    least
-        Least probability of a return.
-    different : int64 (pair, 2)
-        Identities that are known to be two people.
+    `spread` float64 (size,) is the variance of each size among people, `least` the least probability of a return, and
+    `different` int64 (pair, 2) are identities that are known to be two people.
     """
     people, found, chances = _People.of(visits), list[Return](), 0
     named = {identity: visit for visit, identity in enumerate(visits.identity.tolist())}
@@ -171,13 +163,8 @@ def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: F
     A visit's mean errs by the errors of its frames, and by what lasts as long as a visit: light and posture where the
     person happened to be. The variance of the latter is learned from the halves of every visit.
 
-    Parameters
-    ----------
-    identity : int64 (n,)
-        Of each row, 0 for none.
-    frame : int64 (n,)
-    precision, information : float64 (n, size)
-        Of each row, see `stseg.identities.evidence.observations.Observations`.
+    Of each row are `identity` int64 (n,), 0 for none, `frame` int64 (n,), and `precision` and `information` float64 (n,
+    size), see `stseg.identities.evidence.observations.Observations`.
     """
     order = np.lexsort((frame, identity))
     order = order[identity[order] > 0]
@@ -218,14 +205,8 @@ def known_people(committed: Rows, appearance: Rows) -> Rows:
     """Means over the rows of every person, KNOWN_PERSON (k,), by rising id.
 
     Colours are without the offsets of the cameras. Features of a detector are left out: they lie along axes of their
-    recording.
-
-    Parameters
-    ----------
-    committed : TRAJECTORY (n,)
-        Rows as a tracker committed them, under final ids; 0 for none.
-    appearance : APPEARANCE (l,)
-        Of detections.
+    recording. `committed` are TRAJECTORY (n,) rows as a tracker committed them, under final ids, 0 for none;
+    `appearance` is APPEARANCE (l,) of detections.
     """
     people = np.unique(committed["id"][committed["id"] > 0])
     owner = np.where(committed["id"] > 0, np.searchsorted(people, committed["id"]), -1)

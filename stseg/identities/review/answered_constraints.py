@@ -70,13 +70,8 @@ class AnsweredRows:
 def answered_rows(rows: Rows, answers: Sequence[Answer], frame_rate: float) -> AnsweredRows:
     """Constraints and deletions that answers demand; answers were checked by `stseg.identities.review.corrections`.
 
-    Parameters
-    ----------
-    rows : TRAJECTORY (n,)
-        Under the ids that the answers name; 0 for rows of no track.
-    answers
-    frame_rate
-        Frames per second.
+    `rows` TRAJECTORY (n,) are under the ids that the answers name, 0 for rows of no track; `frame_rate` is in frames
+    per second.
     """
     tracks = _Tracks(rows, frame_rate)
     same, other = dict[tuple[int, int], str](), dict[tuple[int, int], str]()

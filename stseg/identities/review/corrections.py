@@ -60,19 +60,9 @@ class Corrections:
 
 
 def solve_corrections(tracks: Rows, answers: Sequence[Answer]) -> Corrections:
-    """Identities under the answers.
+    """Identities under the answers, in any order, about TRACK (n,) of a run.
 
-    Parameters
-    ----------
-    tracks : TRACK (n,)
-        Tracks of the run.
-    answers
-        In any order.
-
-    Raises
-    ------
-    InputError
-        For an answer that names no such track or frame, or that contradicts another.
+    InputError for an answer that names no such track or frame, or that contradicts another.
     """
     last = {int(row["id"]): int(row["last"]) for row in tracks}
     first = {int(row["id"]): int(row["first"]) for row in tracks}

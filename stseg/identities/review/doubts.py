@@ -48,16 +48,9 @@ class Doubt:
 
 
 def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> list[Doubt]:
-    """Doubtful decisions, the most doubtful first.
+    """Doubtful decisions of a run, the most doubtful first.
 
-    Parameters
-    ----------
-    trajectory, tracks
-        Of a run.
-    frame_rate
-        Frames per second.
-    border : float64 (2, 2)
-        Lower and upper corner of the area, metres.
+    `frame_rate` is in frames per second; `border` float64 (2, 2) the lower and upper corner of the area, metres.
     """
     if not len(tracks):
         return []

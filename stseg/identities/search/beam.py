@@ -54,25 +54,12 @@ def extend_beam(
     pasts_of_one: Pasts, other: Hypotheses, pasts_of_other: Pasts, number: int, size: int, counts: Ints, parents: Ints,
     names: Ints,
 ) -> tuple[int, int]:  # fmt: skip
-    """Extend hypotheses by some frames.
+    """Extend hypotheses by some frames, from number `begin` on; the numbers of the new hypotheses and of their pasts.
 
-    Parameters
-    ----------
-    begin, frames
-        Number of the first of these frames, and all of them.
-    every_row, bound_people, constants
-        All rows, the people of constraints, and the constants of the search.
-    one, pasts_of_one, other, pasts_of_other
-        The hypotheses, and room for as many. After an even number of frames the new ones are in the former.
-    number, size
-        Of the hypotheses, and of their pasts.
-    counts : int64 (k,), parents : int64 (k, hypothesis), names : int64 (k, hypothesis, row)
-        Filled with the number of hypotheses after each of k frames, the one before of each, and the names of its rows.
-
-    Returns
-    -------
-    tuple of int
-        Number of the new hypotheses, and of their pasts.
+    The hypotheses are `number` in `one`, with `size` pasts in `pasts_of_one`; `other` and `pasts_of_other` are room for
+    as many. After an even number of frames the new ones are in the former. For each of k frames, `counts` int64 (k,) is
+    filled with the number of hypotheses after it, `parents` int64 (k, hypothesis) with the one before of each, and
+    `names` int64 (k, hypothesis, row) with the names of its rows.
     """
     observed, people, rules = pointed(every_row), pointed(bound_people), pointed(constants)
     hypotheses, pasts = pointed(one), pointed(pasts_of_one)

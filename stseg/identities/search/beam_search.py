@@ -123,18 +123,7 @@ def search_identities(
 ) -> BestHypothesis:  # fmt: skip
     """The most likely identity of each observation.
 
-    Parameters
-    ----------
-    observations
-        The observations.
-    sizes
-        Statistics of the sizes.
-    motion
-        Motion model.
-    limits
-        Extent of the search.
-    constraints
-        Pairs of observations. All are obeyed unless they contradict each other.
+    Constraints are pairs of observations. All are obeyed unless they contradict each other.
     """
     frame = np.repeat(np.arange(len(observations.seconds)), np.diff(observations.start))
     people = KnownPeople.of(constraints, frame)

@@ -45,31 +45,13 @@ def choose_distinct(
     hypotheses: Hypotheses, pasts: Pasts, column: Ints, first: int, observed: ObservedRows, mark: Ints,
     every_alternative: Alternatives, total: int, most_loss: float, before: Present, chosen: Ints,
 ) -> int:  # fmt: skip
-    """Choose the best alternatives of different keys; of equally good ones the first.
+    """Choose the best alternatives of different keys, of equally good ones the first; the number of choices.
 
-    Parameters
-    ----------
-    hypotheses, pasts
-        The hypotheses before.
-    column : int64 (hypothesis, row)
-        Slot of each row by the best assignment, -1 for a new person.
-    first, observed
-        The frame's first row, and all rows.
-    mark : int64 (hypothesis,)
-        Differs where constraints bind the hypotheses otherwise.
-    every_alternative, total
-        The alternatives, and how many there are.
-    most_loss
-        Greatest loss against the best alternative, nats.
-    before
-        Room for their people.
-    chosen : int64 (most,)
-        Filled with alternatives, the best first.
-
-    Returns
-    -------
-    int
-        Number of choices.
+    The hypotheses before are `hypotheses` and `pasts`, with the slot of each row by the best assignment in `column`
+    int64 (hypothesis, row), -1 for a new person, and `mark` int64 (hypothesis,), which differs where constraints bind
+    the hypotheses otherwise; `before` is room for their people. `first` is the frame's first row of all rows,
+    `observed`. `total` alternatives there are; `most_loss` is the greatest loss against the best, nats. `chosen` int64
+    (most,) is filled with alternatives, the best first.
     """
     alternatives, present, size = pointed(every_alternative), pointed(before), 2
     while size < 2 * len(chosen):

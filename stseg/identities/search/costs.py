@@ -119,16 +119,9 @@ def crossings_of(
 ) -> Crossings:
     """Crossings between the rows from `before` and those from `first` to before `stop`.
 
-    Parameters
-    ----------
-    before, first, stop
-        Rows.
-    ground : float64 (n, 2), variance : float64 (n,)
-        Places of rows in metres, and the variance of each coordinate.
-    bend_square
-        Square of the distance of a walk from the straight path (variance), square metres.
-    room
-        Distance below which two bodies overlap, metres.
+    `ground` float64 (n, 2) are places of rows in metres, `variance` float64 (n,) that of each coordinate. `bend_square`
+    is the square of the distance of a walk from the straight path (variance), square metres, and `room` the distance
+    below which two bodies overlap, metres.
     """
     then, now = np.empty((first - before, first - before), np.int64), np.empty((stop - first, stop - first), np.int64)
     cost = np.empty((_number_near_pairs(ground, first, now), _number_near_pairs(ground, before, then)))

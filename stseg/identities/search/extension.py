@@ -196,23 +196,9 @@ def add_alternatives(
 ) -> int:  # fmt: skip
     """Add the best assignment, and those that differ from it by one exchange of two rows, or another identity of one.
 
-    Parameters
-    ----------
-    h, one, identities
-        The hypothesis, and the number of its identities.
-    score
-        Of the best assignment, nats, but for crossings.
-    crossings
-        What it costs that two people cross.
-    most
-        Greatest loss of an alternative, nats, but for crossings.
-    number, found
-        Alternatives so far, to which these are added.
-
-    Returns
-    -------
-    int
-        Number of alternatives.
+    Hypothesis `h` has so many identities, and its best assignment a score, nats, but for crossings: what it costs that
+    two people cross. `most` is the greatest loss of an alternative, nats, but for crossings. Returned is the number of
+    alternatives in `found`, which were `number` before.
     """
     cost, assigned, slot = one.cost, one.assigned, one.slot
     crossed = crossings.cost.size > 0

@@ -57,18 +57,8 @@ def fill_successors(
 ) -> int:  # fmt: skip
     """Fill hypotheses with those before and a frame's rows from `first` on, and number their pasts.
 
-    Parameters
-    ----------
-    hypotheses, pasts, size
-        The hypotheses before, their pasts, and the number of these.
-    slots
-        Number of slots.
-    first, now, observed
-        The frame's first row and its time, and all rows.
-    rules
-        The constants of the search.
-    successors, later_pasts
-        Filled, but for scores.
+    The hypotheses before have `size` pasts. `slots` is the number of slots, and `now` the frame's time; `observed` are
+    all rows. `successors` and `later_pasts` are filled, but for scores.
     """
     rows, number = slot.shape[1], 0
     later, now_born = np.empty((size, rows + 1), np.int64), np.empty(rows, np.int64)

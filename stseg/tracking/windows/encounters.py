@@ -22,12 +22,8 @@ _KINDS = (b"merge", b"split")
 def touches(first: int, blobs: Sequence[Blobs], identity: Sequence[Ints]) -> list[tuple[int, str, int, int, str]]:
     """Contacts: intervals of frames in which two tracks touch, a merge at the first frame and a split at the last.
 
-    Parameters
-    ----------
-    first
-        Frame of the first element of `blobs` and `identity`.
-    blobs, identity
-        One element a frame; `identity` holds the track of each blob, 0 for none.
+    `blobs` and `identity`, the track of each blob, 0 for none, have one element a frame; `first` is the first of these
+    frames.
     """
     events: list[tuple[int, str, int, int, str]] = []
     before: set[tuple[int, int]] = set()
@@ -47,18 +43,10 @@ def _pairs(found: Blobs, names: Ints) -> set[tuple[int, int]]:
 def encounters(contacts: Rows, name: Callable[[int, int], int], parting: int, frame_rate: float, last: int) -> Rows:
     """Encounters of the whole run, EVENT rows: a merge at the first contact and a split after the last.
 
-    Parameters
-    ----------
-    contacts : EVENT (n,)
-        Of all windows, from `touches`, sorted by frame; rows of other kinds are ignored.
-    name
-        Identity of a track in a frame; 0 for a dropped track.
-    parting
-        Contacts of one pair with at most this many frames between them are one encounter.
-    frame_rate
-        Frames per second.
-    last
-        The run's last frame; a contact that lasts to it has no split.
+    `contacts` EVENT (n,) are those of all windows, from `touches`, sorted by frame; rows of other kinds are ignored.
+    `name` gives the identity of a track in a frame; 0 for a dropped track. Contacts of one pair with at most `parting`
+    frames between them are one encounter. `frame_rate` is in frames per second; a contact that lasts to `last`, the
+    run's last frame, has no split.
     """
     rows: list[tuple[int, bytes, int, int, str]] = []
     for (a, b), intervals in _by_pair(contacts, name).items():

@@ -14,17 +14,8 @@ _ENCOUNTER_DISTANCE = 0.6
 def isolated_tracklets(trajectory: Rows, frame_rate: float) -> list[Ints]:
     """Tracks cut at gaps and at the closest approach of each encounter.
 
-    Parameters
-    ----------
-    trajectory : TRAJECTORY (n,)
-        Of the whole run, in any order.
-    frame_rate
-        Frames per second.
-
-    Returns
-    -------
-    list of int64 (k,)
-        Rows of each tracklet, in the order of time.
+    Each is int64 (k,), rows of the trajectory, TRAJECTORY (n,) of the whole run in any order, in the order of time.
+    `frame_rate` is in frames per second.
     """
     order = np.lexsort((trajectory["frame"], trajectory["id"]))
     track, frame = trajectory["id"][order], trajectory["frame"][order]

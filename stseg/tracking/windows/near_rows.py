@@ -8,19 +8,10 @@ from stseg.arrays import Floats, Ints, Rows
 
 
 def near_rows(trajectory: Rows, distance: float) -> tuple[Ints, Floats]:
-    """Pairs of rows of one frame less than a distance apart.
+    """Pairs of rows of one frame less than a distance apart, metres; the trajectory, TRAJECTORY (n,), is in any order.
 
-    Parameters
-    ----------
-    trajectory : TRAJECTORY (n,)
-        In any order.
-    distance
-        Metres.
-
-    Returns
-    -------
-    int64 (k, 2), float64 (k,)
-        The rows of each pair, that of the lower id first, and how far apart they are; in no order.
+    Returns the rows of each pair, int64 (k, 2), that of the lower id first, and their distances, float64 (k,), in no
+    order.
     """
     order = np.lexsort((trajectory["id"], trajectory["frame"]))
     frame, x, y = (trajectory[name][order] for name in ("frame", "x", "y"))

@@ -63,18 +63,11 @@ class Tracklet:
 
 
 def form_tracklets(blobs: Sequence[Blobs], first: int, config: TrackingConfig) -> list[Tracklet]:
-    """The tracklets of a window.
+    """The tracklets of a window, which begins with frame `first`.
 
     Blobs that hold detections of one filter track are one tracklet. A blob without a detection joins the tracklet with
-    a gap there, near the interpolated place, unless another track claims it. So the cut bridges missed
-    detections, and nothing more.
-
-    Parameters
-    ----------
-    blobs
-        Of each frame of the window; `track` holds filter tracks.
-    first
-        The window's first frame.
+    a gap there, near the interpolated place, unless another track claims it. So the cut bridges missed detections, and
+    nothing more. `blobs` are those of each frame of the window; `track` of them holds filter tracks.
     """
     tracklets: dict[int, Tracklet] = {}
     for offset, found in enumerate(blobs):

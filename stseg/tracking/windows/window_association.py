@@ -53,12 +53,8 @@ class TrackAssociation:
     def decide(self, window: Window, blobs: Sequence[Blobs], tracklets: Sequence[Tracklet]) -> WindowAssignment:
         """Assign an identity to every tracklet of a window, with events.
 
-        Parameters
-        ----------
-        blobs
-            Of each frame of the window's solve range.
-        tracklets
-            Of the window, from `form_tracklets`.
+        `blobs` are those of each frame of the window's solve range, `tracklets` those that `form_tracklets` made of
+        them.
         """
         names = self._names(window, blobs, tracklets)
         identity = [np.zeros(len(found.person), np.int64) for found in blobs]
