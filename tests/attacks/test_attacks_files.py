@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attacks import RIG, SECONDS, refusal, write_rig
+from refusals import refused
 from run_files import write_small_run
 
 from stseg.commands.main import main
@@ -161,16 +162,14 @@ def test_a_name_of_a_million_digits_is_numbered_in_time() -> None:
 
 @pytest.mark.parametrize("points", [[[0.0, 0.0], [1.0, 0.0], [1e308, 1.0]], [[np.nan, 0.0]] * 3])
 def test_outlines_far_beyond_an_image_are_refused(points: list[list[float]]) -> None:
-    with pytest.raises(ValueError, match="far beyond"):
-        polygons([np.array(points)])
+    refused(ValueError, "far beyond", polygons, [np.array(points)])
 
 
 @pytest.mark.parametrize("segments", [{"x": [1, 5, 10**400], "y": [1, 1, 9]}, {"x": [1e300, 5, 5], "y": [1, 1, 9]}, 7])
 def test_segments_that_are_no_outline_are_refused(tmp_path: Path, segments: object) -> None:
     box = {"x1": 1, "y1": 2, "x2": 9, "y2": 20}
     (tmp_path / "r.json").write_text(json.dumps([[{"name": "person", "box": box, "segments": segments}]]))
-    with pytest.raises(FormatError, match="frame 0, detection 0"):
-        read_source(Source("instances", tmp_path / "r.json"), SIZE)
+    refused(FormatError, "frame 0, detection 0", read_source, Source("instances", tmp_path / "r.json"), SIZE)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -200,22 +199,18 @@ def test_a_parquet_file_of_many_rows_or_another_type_is_refused(tmp_path: Path) 
     names = ("frame", "left", "top", "width", "height")
     parquet.write_table(arrow.table(dict.fromkeys(names, zeros)), path, compression="zstd")
     assert path.stat().st_size < 1_000_000
-    with pytest.raises(FormatError, match="rows, more than"):
-        read_source(Source("boxes", path), SIZE)
+    refused(FormatError, "rows, more than", read_source, Source("boxes", path), SIZE)
     nested = arrow.array([[1]])
     parquet.write_table(arrow.table(dict.fromkeys(names, nested)), path)
-    with pytest.raises(FormatError, match=r"row 0: found frame \[1\]"):
-        read_source(Source("boxes", path), SIZE)
+    refused(FormatError, r"row 0: found frame \[1\]", read_source, Source("boxes", path), SIZE)
 
 
 @pytest.mark.parametrize("name", ["\x1b[31m", "x" * 101, "a\0b", ""])
 def test_names_of_people_are_printable(tmp_path: Path, name: str) -> None:
     (tmp_path / "names.csv").write_text(f"id,name\n1,{name}\n")
-    with pytest.raises(FormatError, match="line 2: found name"):
-        read_names(tmp_path / "names.csv")
+    refused(FormatError, "line 2: found name", read_names, tmp_path / "names.csv")
     (tmp_path / "answers.csv").write_text(f"action,id,name\nname,1,{name}\n")
-    with pytest.raises(FormatError, match="line 2: found name"):
-        read_answers(tmp_path / "answers.csv", ("name",))
+    refused(FormatError, "line 2: found name", read_answers, tmp_path / "answers.csv", ("name",))
 
 
 def test_names_may_be_anything_that_prints(tmp_path: Path) -> None:
@@ -235,5 +230,4 @@ def test_keyframes_far_apart_are_refused(tmp_path: Path, frames: tuple[int, int]
     steps = [{"frame": frame, "enabled": True, "x": 1, "y": 2, "width": 9, "height": 20} for frame in frames]
     track = {"type": "videorectangle", "value": {"sequence": steps, "labels": ["person"]}}
     (tmp_path / "s.json").write_text(json.dumps([{"data": {"video": "a"}, "annotations": [{"result": [track]}]}]))
-    with pytest.raises(FormatError, match="result 0: found keyframes"):
-        read_source(Source("boxes", tmp_path / "s.json"), SIZE)
+    refused(FormatError, "result 0: found keyframes", read_source, Source("boxes", tmp_path / "s.json"), SIZE)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from browser import CHROMIUM, Page, chromium
+from refusals import refused
 from simulated_people import SIZE, exchanged, moved, ring, shown, walkers
 
 from stseg.arrays import Boxes, Floats
@@ -195,16 +196,14 @@ class TestCommand:
         ]  # fmt: skip
         page = Path("check.html").read_text()
         assert "cam3 is off" in page and page.count("<img") == 5
-        with pytest.raises(OutputError, match=r"check.html: found a file that exists"):
-            self.check(str(rig_file), "-o=check.html")
+        refused(OutputError, r"check.html: found a file that exists", self.check, str(rig_file), "-o=check.html")
 
     def test_as_json_of_some_frames(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self.check(str(rig_file), "--json", "--frames=4:40")
         found = json.loads(capsys.readouterr().out)
         assert found["off"] == ["cam3"] and not found["sound"]
         assert set(found["views"]) == {"cam1", "cam2", "cam3", "cam4"}
-        with pytest.raises(ConfigError, match=r"--frames: found '9'"):
-            self.check(str(rig_file), "--frames=9")
+        refused(ConfigError, r"--frames: found '9'", self.check, str(rig_file), "--frames=9")
 
 
 class TestRealRigs:
@@ -331,8 +330,7 @@ def test_undo_poles_keys_and_the_hint(page: Page) -> None:
 
 
 def test_wrong_options_are_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="x0 below x1"):
-        make(tmp_path, area="3,0,-3,1")
+    refused(ConfigError, "x0 below x1", make, tmp_path, area="3,0,-3,1")
     cv2.imwrite(str(tmp_path / "plan.png"), np.zeros((100, 200, 3), np.uint8))
     with pytest.raises(ConfigError, match="a picture that spans --area"):
         make(tmp_path, f"--plan={tmp_path / 'plan.png'}", "--overwrite")

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from hypothesis import given
+from refusals import refused
 from scenes import looking
 from strategies import BARREL, Pose, poses
 
@@ -166,8 +167,7 @@ class TestWrongPoints:
         ],
     )
     def test_points_that_fix_nothing_are_named(self, ground: Floats, complaint: str) -> None:
-        with pytest.raises(CalibrationError, match=rf"camera cam: points: found {complaint}"):
-            fit(points_of(camera(), ground), camera())
+        refused(CalibrationError, rf"camera cam: points: found {complaint}", fit, points_of(camera(), ground), camera())
 
 
 def table(path: Path, change: Callable[[str, list[float]], list[float]] = lambda _, row: row) -> Path:
@@ -203,8 +203,7 @@ class TestCommand:
 
     def test_millimetres_are_named_and_taken(self) -> None:
         table(Path("p.csv"), lambda _, row: [*row[:2], *(1000 * cell for cell in row[2:])])
-        with pytest.raises(CalibrationError, match=r"camera a: --unit m: found a camera 2600 m .*\(--unit mm\)"):
-            run("p.csv")
+        refused(CalibrationError, r"camera a: --unit m: found a camera 2600 m .*\(--unit mm\)", run, "p.csv")
         run("p.csv", "--unit=mm")
         assert off(read_recording("room.toml").rig.cameras[0], camera(0.7)) < 0.05
 
@@ -234,14 +233,12 @@ class TestCommand:
     )
     def test_says_what_to_mend(self, text: str, kind: type[InputError], complaint: str) -> None:
         Path("p.csv").write_text(text)
-        with pytest.raises(kind, match=complaint):
-            run("p.csv")
+        refused(kind, complaint, run, "p.csv")
         assert not Path("room.toml").exists()
 
     def test_a_lens_for_each_camera(self) -> None:
         table(Path("p.csv"))
-        with pytest.raises(ConfigError, match=r"--lens: found 'lens.xml', expected a path with"):
-            run("p.csv", "--lens=lens.xml")
+        refused(ConfigError, r"--lens: found 'lens.xml', expected a path with", run, "p.csv", "--lens=lens.xml")
 
 
 def test_points_are_read_as_they_stand(tmp_path: Path) -> None:
@@ -300,5 +297,4 @@ def test_the_lens_comes_back(video: Path, tmp_path: Path, capsys: pytest.Capture
 def test_a_wrong_board_is_named(video: Path, tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="found 0 views of the whole board"):
         calibrate_lens(video, board="9,6", output=tmp_path / "lens.xml", every=4)
-    with pytest.raises(ConfigError, match="3 or more"):
-        calibrate_lens(video, board="2,5", output=tmp_path / "lens.xml")
+    refused(ConfigError, "3 or more", calibrate_lens, video, board="2,5", output=tmp_path / "lens.xml")

@@ -16,6 +16,7 @@ import pytest
 import reference_evaluation as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from stseg.arrays import Flags, Ints, Rows
 from stseg.commands.evaluate import evaluate as command
@@ -190,19 +191,15 @@ def test_a_trajectory_table_is_taken_as_it_is() -> None:
 
 @pytest.mark.parametrize("gate", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_gate_that_cannot_be_is_refused(gate: float) -> None:
-    with pytest.raises(ConfigError, match="gate"):
-        evaluate(TWO, TWO, gate)
+    refused(ConfigError, "gate", evaluate, TWO, TWO, gate)
 
 
 def test_tables_that_cannot_be_are_refused() -> None:
     lost = TWO.copy()
     lost["y"][3] = np.nan
-    with pytest.raises(FormatError, match="tracks: frame 3, id 1: found a position that is not finite"):
-        evaluate(TWO, lost)
-    with pytest.raises(FormatError, match="truth: frame 0: found id 1 twice"):
-        evaluate(np.concatenate([TWO, TWO[:1]]), TWO)
-    with pytest.raises(ConfigError, match="area"):
-        evaluate(TWO, TWO, area=(1, 0, 0, 1))
+    refused(FormatError, "tracks: frame 3, id 1: found a position that is not finite", evaluate, TWO, lost)
+    refused(FormatError, "truth: frame 0: found id 1 twice", evaluate, np.concatenate([TWO, TWO[:1]]), TWO)
+    refused(ConfigError, "area", evaluate, TWO, TWO, area=(1, 0, 0, 1))
 
 
 # Properties and other judges
@@ -371,14 +368,12 @@ def test_the_command_line_is_understood(files: tuple[Path, Path], capsys: pytest
 
 @pytest.mark.parametrize("frames", ["5:2", "5:5", "a:b", "1:2:3", "", "3,", ":", "2:"])
 def test_frames_that_make_no_sense_are_refused(files: tuple[Path, Path], frames: str) -> None:
-    with pytest.raises(ConfigError, match="--frames"):
-        command(*files, frames=frames)
+    refused(ConfigError, "--frames", command, *files, frames=frames)
 
 
 @pytest.mark.parametrize("area", ["1,2,3", "a,b,c,d", "3,0,1,1", "0,nan,1,1", ""])
 def test_areas_that_make_no_sense_are_refused(files: tuple[Path, Path], area: str) -> None:
-    with pytest.raises(ConfigError, match="--area"):
-        command(*files, area=area)
+    refused(ConfigError, "--area", command, *files, area=area)
 
 
 def test_a_run_file_is_read_as_a_run(

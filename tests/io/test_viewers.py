@@ -19,6 +19,7 @@ import silx.io
 import silx.io.nxdata
 import xarray
 from recordings import data_path
+from refusals import refused
 from run_files import FRAMES, small_ghosts, small_trajectory, small_volume, write_small_run
 
 from stseg.commands.main import main
@@ -120,14 +121,12 @@ def test_tables_as_data_frames(run_path: Path) -> None:
     assert "parts_right" in ghosts
     for name in layout.ABOUT:
         assert isinstance(run.data_frame(name), pandas.DataFrame)
-    with pytest.raises(ValueError, match="table 'people' is none of trajectory"):
-        run.data_frame("people")
+    refused(ValueError, "table 'people' is none of trajectory", run.data_frame, "people")
 
 
 def test_pandas_is_asked_for_where_it_is_missing(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ConfigError, match=r"pip install 'stseg\[pandas\]'"):
-        read_run(run_path).data_frame("tracks")
+    refused(ConfigError, r"pip install 'stseg\[pandas\]'", read_run(run_path).data_frame, "tracks")
 
 
 # napari
@@ -226,8 +225,7 @@ def test_labels_that_were_packed_otherwise_are_refused(label: np.ndarray, wrong:
         "no deflate": PackedFrame(0, label.tobytes()),
         "not shuffled": PackedFrame(1, zlib.compress(label.tobytes())),
     }
-    with pytest.raises(ValueError, match=r".+"):
-        unpacked_label(frames[wrong], SHAPE)
+    refused(ValueError, r".+", unpacked_label, frames[wrong], SHAPE)
 
 
 @pytest.fixture(scope="module")

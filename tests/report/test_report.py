@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import run_files
 from numpy.typing import ArrayLike
+from refusals import refused
 
 from stseg.arrays import AnyArray, Bytes, Rows
 from stseg.commands.report import report
@@ -110,8 +111,7 @@ def test_names_that_no_file_can_have_are_refused(tmp_path: Path, name: str) -> N
     path = run_files.write_small_run(tmp_path / "run.h5")
     with h5py.File(path, "r+") as file:
         file.attrs["cameras"] = ["left", name]
-    with pytest.raises(FormatError, match="names of cameras"):
-        report(path, output=tmp_path / "evil.html")
+    refused(FormatError, "names of cameras", report, path, output=tmp_path / "evil.html")
     assert not (tmp_path / "evil.html").exists()
 
 
@@ -186,11 +186,9 @@ def test_write_pictures_replaces_older_ones(run_file: Path, tmp_path: Path) -> N
 
 
 def test_errors_of_the_user_are_reported(run_file: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"--frame.*found 99.*10 to 15"):
-        report(run_file, output=tmp_path / "a.html", frame=(99,))
+    refused(ConfigError, r"--frame.*found 99.*10 to 15", report, run_file, output=tmp_path / "a.html", frame=(99,))
     (tmp_path / "old.html").write_text("old")
-    with pytest.raises(OutputError, match="overwrite"):
-        report(run_file, output=tmp_path / "old.html")
+    refused(OutputError, "overwrite", report, run_file, output=tmp_path / "old.html")
     report(run_file, output=tmp_path / "old.html", overwrite=True, frame=(11,))
     assert (tmp_path / "old.html").read_text() != "old"
     with pytest.raises(OutputError):

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_simulate import extents, hits, shade
+from refusals import refused
 from strategies import cameras
 
 from stseg.arrays import Floats
@@ -452,8 +453,7 @@ def test_a_written_scene_reads_back(tmp_path: Path) -> None:
 def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     film = SceneFilm(replace(TINY, seconds=0.1))
-    with pytest.raises(OutputError, match="files in it"):
-        write_scene(tmp_path, film)
+    refused(OutputError, "files in it", write_scene, tmp_path, film)
     assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
     write_scene(tmp_path, film, overwrite=True)
     assert (tmp_path / "notes.txt").read_text() == "mine"
@@ -483,10 +483,8 @@ def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_command_suggests_a_scene(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="did you mean dense"):
-        simulate(tmp_path, scene="dence")
-    with pytest.raises(ConfigError, match="--size"):
-        simulate(tmp_path, scene="tiny", size="40x30")
+    refused(ConfigError, "did you mean dense", simulate, tmp_path, scene="dence")
+    refused(ConfigError, "--size", simulate, tmp_path, scene="tiny", size="40x30")
 
 
 def test_animals_have_their_length_in_the_direction_they_face() -> None:
