@@ -1,18 +1,11 @@
-"""What tests of hostile input share: the one line of a refusal, a small rig, a short film."""
+"""Parts of tests of hostile input: a small rig, a short film."""
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import cv2
 import numpy as np
-import pytest
-
-from stseg.commands.main import main
-
-SECONDS = 10.0
-"""Time within which any input is answered."""
 
 RIG = """
 format = 1
@@ -32,20 +25,6 @@ ground = [[60.0, 32.0, 192.0], [0.0, 24.0, 324.0], [0.0, 1.0, 6.0]]
 vertical = [0.0, -60.0, 0.0]
 source = { kind = "boxes", path = "boxes.csv" }
 """
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """The one line of a command that refuses its input in time."""
-    begun = time.monotonic()
-    status = main([str(argument) for argument in arguments])
-    error = capsys.readouterr().err
-    assert status == 2, error
-    assert time.monotonic() - begun < SECONDS
-    lines = [line for line in error.splitlines() if line]
-    assert len(lines) == 1, error
-    assert lines[0].startswith("stseg: error: ")
-    assert lines[0].isprintable()
-    return lines[0]
 
 
 def write_rig(folder: Path, old: str = "", new: str = "") -> Path:

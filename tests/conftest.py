@@ -1,10 +1,15 @@
-"""Settings of all tests."""
+"""Settings of all tests, and what tests of many rooms begin with."""
 
+import time
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 from recordings import track, write_recording
+from refusals import REFUSAL_TIME, Command
+from run_files import write_small_run
+
+from stseg.commands.main import main
 
 # Examples take as long as they take on a machine that others use, too: only a whole test may be too slow.
 settings.register_profile("timeless", deadline=None)
@@ -23,3 +28,44 @@ def undisturbed(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     path = tmp_path_factory.mktemp("undisturbed") / "run.h5"
     assert track(rig_path, path) == 0
     return path
+
+
+@pytest.fixture
+def run_path(tmp_path: Path) -> Path:
+    """A small run file, in a folder of its own."""
+    (tmp_path / "run").mkdir()
+    return write_small_run(tmp_path / "run" / "night.h5")
+
+
+@pytest.fixture
+def stdout(capsys: pytest.CaptureFixture[str]) -> Command:
+    """A command that ends with the status 0; its standard output."""
+
+    def call(*arguments: object) -> str:
+        capsys.readouterr()
+        status = main([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        assert status == 0, printed.err
+        return printed.out
+
+    return call
+
+
+@pytest.fixture
+def refusal(capsys: pytest.CaptureFixture[str]) -> Command:
+    """A command that refuses its input in time; its one line."""
+
+    def call(*arguments: object) -> str:
+        capsys.readouterr()
+        begun = time.monotonic()
+        status = main([str(argument) for argument in arguments])
+        error = capsys.readouterr().err
+        assert status == 2, error
+        assert time.monotonic() - begun < REFUSAL_TIME
+        lines = [line for line in error.splitlines() if line]
+        assert len(lines) == 1, error
+        assert lines[0].startswith("stseg: error: ")
+        assert lines[0].isprintable()
+        return lines[0]
+
+    return call

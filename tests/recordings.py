@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -25,6 +26,17 @@ ALONE = ("--workers", "1")
 """In this process alone."""
 compiled_only = pytest.mark.skipif(not COMPILED, reason="too slow without a compiler")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+COMMAND = "import sys; from stseg.commands.main import main; sys.exit(main())"
+"""The program, for a process of its own."""
+
+
+def process(
+    program: str, *arguments: object, cwd: Path | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """A Python program in a process of its own, at its end."""
+    command = [sys.executable, "-c", program, *map(str, arguments)]
+    given = {**ENVIRONMENT, **environment}
+    return subprocess.run(command, env=given, cwd=cwd, capture_output=True, text=True, check=False)
 
 
 def data_path(name: str) -> Path:

@@ -8,6 +8,10 @@ from typing import ParamSpec
 import pytest
 
 P = ParamSpec("P")
+Command = Callable[..., str]
+"""Calls a command with arguments of any kind; its answer."""
+REFUSAL_TIME = 10.0
+"""Time within which any input is answered, seconds."""
 
 
 def refused(kind: type[Exception], match: str, call: Callable[P, object], *args: P.args, **kwargs: P.kwargs) -> str:

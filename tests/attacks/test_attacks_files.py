@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from attacks import RIG, SECONDS, refusal, write_rig
-from refusals import refused
-from run_files import write_small_run
+from attacks import RIG, write_rig
+from recordings import COMMAND, process
+from refusals import REFUSAL_TIME, Command, refused
 
 from stseg.commands.main import main
 from stseg.errors import FormatError, InputError
@@ -21,16 +20,12 @@ from stseg.io.answers import read_answers, read_names
 from stseg.io.detections.masks import RunLengths, polygons, run_lengths
 from stseg.io.detections.record import Detections, last_numbers
 from stseg.io.detections.source_detections import instance_image, read_source
+from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.recording import Source
 from stseg.io.recording.rigs import parse_rig, read_recording
+from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.io.untrusted.values import is_name
-
-
-@pytest.fixture
-def run_file(tmp_path: Path) -> Path:
-    (tmp_path / "run").mkdir()
-    return write_small_run(tmp_path / "run" / "night.h5")
 
 
 @pytest.mark.parametrize("name", ["..", ".", "a/b", "a\\b", "a\0b", "", " a", "x" * 200, "\x1b[31m", "\u202e", "a\nb"])
@@ -45,23 +40,22 @@ def test_unusual_names_work(name: str) -> None:
     assert parse_rig(RIG.replace('"cam1"', json.dumps(name)), Path("rig.toml")).rig.cameras[0].name == name
 
 
-def test_a_foreign_folder_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_foreign_folder_is_left_alone(tmp_path: Path, refusal: Command) -> None:
     rig, folder = write_rig(tmp_path), tmp_path / "q.h5.segments"
     folder.mkdir()
-    for name in ("thesis.txt", "begun.json", "segment-00000.h5"):
+    names = ("thesis.txt", "begun.json", "segment-00000.h5")
+    for name in names:
         (folder / name).write_text("precious")
     for more in ((), ("--frames", "5:3"), ("--overwrite",)):
-        assert "did not make" in refusal(capsys, "run", rig, "-o", tmp_path / "q.h5", *more)
-    assert {path.name: path.read_text() for path in folder.iterdir()} == dict.fromkeys(
-        ("thesis.txt", "begun.json", "segment-00000.h5"), "precious"
-    )
+        assert "did not make" in refusal("run", rig, "-o", tmp_path / "q.h5", *more)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == dict.fromkeys(names, "precious")
 
 
-def test_a_work_folder_that_is_a_link_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_work_folder_that_is_a_link_is_refused(tmp_path: Path, refusal: Command) -> None:
     (tmp_path / "else").mkdir()
     with WorkFolder(tmp_path / "else" / "q.h5", {}) as work:
         (tmp_path / "q.h5.segments").symlink_to(work.path)
-        refusal(capsys, "run", write_rig(tmp_path), "-o", tmp_path / "q.h5")
+        refusal("run", write_rig(tmp_path), "-o", tmp_path / "q.h5")
         assert work.begun
 
 
@@ -76,15 +70,15 @@ def test_our_folder_keeps_files_that_are_not_ours(tmp_path: Path) -> None:
     assert not (tmp_path / "q.h5.segments").exists()
 
 
-def test_links_and_files_beside_an_output_are_not_written_to(run_file: Path) -> None:
-    target, link, plain = (run_file.with_name(name) for name in ("target", "t.csv.part", "u.csv.part"))
+def test_links_and_files_beside_an_output_are_not_written_to(run_path: Path) -> None:
+    target, link, plain = (run_path.with_name(name) for name in ("target", "t.csv.part", "u.csv.part"))
     target.write_text("precious")
     plain.write_text("precious")
     link.symlink_to(target)
     for name in ("t.csv", "u.csv"):
-        assert main(["export", str(run_file), "--to", "csv", "-o", str(run_file.with_name(name))]) == 0
+        assert main(["export", str(run_path), "--to", "csv", "-o", str(run_path.with_name(name))]) == 0
     assert (target.read_text(), plain.read_text(), link.is_symlink()) == ("precious", "precious", True)
-    assert not run_file.with_name("t.csv").is_symlink()
+    assert not run_path.with_name("t.csv").is_symlink()
 
 
 @pytest.mark.parametrize("content", ["", "[]", "1", "null", "[" * 100_000, '{"config": []}', "\xff"])
@@ -98,8 +92,6 @@ def test_notes_of_another_form_are_refused(tmp_path: Path, content: str) -> None
 def test_damaged_time_stamps_are_made_anew(tmp_path: Path) -> None:
     recording = read_recording(write_rig(tmp_path))
     with WorkFolder(tmp_path / "q.h5", {}) as work:
-        from stseg.io.recording.aligned_stream import index_streams
-
         work.keep_streams(index_streams(recording))
         path = work.path / "streams.npz"
         whole = path.read_bytes()
@@ -117,8 +109,6 @@ def test_damaged_time_stamps_are_made_anew(tmp_path: Path) -> None:
 
 
 def test_a_recording_that_changed_in_place_is_noticed(tmp_path: Path) -> None:
-    from stseg.io.runfile.provenance import gather_provenance, run_request
-
     recording, path = read_recording(write_rig(tmp_path)), tmp_path / "boxes.csv"
     before, state = run_request(recording, gather_provenance(recording, "")), path.stat()
     path.write_text(path.read_text().replace("3,11", "3,12"))
@@ -128,22 +118,16 @@ def test_a_recording_that_changed_in_place_is_noticed(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a limit of file sizes that can be set")
 @pytest.mark.parametrize("to", ["sqlite", "duckdb", "jupedsim", "csv"])
-def test_a_limit_of_file_sizes_is_one_line(run_file: Path, to: str) -> None:
+def test_a_limit_of_file_sizes_is_one_line(run_path: Path, to: str) -> None:
     """F19: SQLite reports a disk error of its own kind."""
     if to == "duckdb":
         pytest.importorskip("duckdb")
-    program = (
-        "import resource, signal, sys; from stseg.commands.main import main;"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100));"
-        f"sys.exit(main(['export', {str(run_file)!r}, '--to', {to!r}, '-o', {str(run_file.with_name('out'))!r}]))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
-    )  # fmt: skip
+    limit = "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+    limit += "resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100));"
+    done = process(limit + COMMAND, "export", run_path, "--to", to, "-o", run_path.with_name("out"))
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
     assert done.stderr.startswith("stseg: error: ")
-    assert sorted(path.name for path in run_file.parent.iterdir()) == ["left.avi", "night.h5"]
+    assert sorted(path.name for path in run_path.parent.iterdir()) == ["left.avi", "night.h5"]
 
 
 # Detections
@@ -157,7 +141,7 @@ def test_a_name_of_a_million_digits_is_numbered_in_time() -> None:
     numbers = last_numbers(["a" + "9" * 1_000_000, "7" * 1_000_000 + "b"])
     assert numbers is not None
     assert numbers.tolist() == [10**15 - 1, 777_777_777_777_777]
-    assert time.monotonic() - begun < SECONDS
+    assert time.monotonic() - begun < REFUSAL_TIME
 
 
 @pytest.mark.parametrize("points", [[[0.0, 0.0], [1.0, 0.0], [1e308, 1.0]], [[np.nan, 0.0]] * 3])
@@ -188,7 +172,7 @@ def test_boxes_of_large_masks_take_no_images(tmp_path: Path) -> None:
     (tmp_path / "r.json").write_text(json.dumps(masks))
     begun = time.monotonic()
     read_source(Source("boxes", tmp_path / "r.json"), SIZE)
-    assert time.monotonic() - begun < SECONDS
+    assert time.monotonic() - begun < REFUSAL_TIME
     assert run_lengths([8000, 8000], [9, 63_999_991]).box() == (0.0, 0.0, 8000.0, 8000.0)
 
 

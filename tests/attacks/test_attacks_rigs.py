@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import struct
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -13,8 +12,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from attacks import RIG, film, refusal, write_rig
-from refusals import refused
+from attacks import RIG, film, write_rig
+from recordings import COMMAND, process
+from refusals import Command, refused
 
 from stseg.errors import InputError, SourceError
 from stseg.io.calibrations.matlab_file import parse_mat
@@ -24,6 +24,9 @@ from stseg.io.recording.source_files import source_parts
 from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.io.recording.video.packets import PictureHeads
 from stseg.io.untrusted.numpy_files import parse_npy
+
+SCENE = ("--area=0,0,1,1", "--frame-rate=5")
+LENS = "matrix = [[50.0,0,32],[0,50.0,24],[0,0,1]]"
 
 
 @pytest.mark.parametrize(
@@ -46,28 +49,23 @@ from stseg.io.untrusted.numpy_files import parse_npy
         ('path = "boxes.csv"', f'path = "{"x" * 300}"'),
         ('path = "boxes.csv"', 'path = "a\\u0000b"'),
         ('kind = "boxes", path = "boxes.csv"', 'kind = "masks", path = "/"'),
-        (
-            "source = {",
-            "lens = { matrix = [[50.0,0,32],[0,50.0,24],[0,0,1]], distortion = [1e308, 1e308] }\nsource = {",
-        ),
+        ("source = {", f"lens = {{ {LENS}, distortion = [1e308, 1e308] }}\nsource = {{"),
         ("[grid]", "polygon = [" + "[0.0, 0.0], " * 100_000 + "]\n[grid]"),
         ("[grid]", ".".join("a" * 200_000) + " = 1\n[grid]"),
         ("[grid]", "a = " + "[" * 100_000 + "\n[grid]"),
     ],
 )
-def test_rigs_beyond_the_limits_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str
-) -> None:
-    refusal(capsys, "run", write_rig(tmp_path, old, new), "-o", tmp_path / "q.h5")
+def test_rigs_beyond_the_limits_are_refused(tmp_path: Path, refusal: Command, old: str, new: str) -> None:
+    refusal("run", write_rig(tmp_path, old, new), "-o", tmp_path / "q.h5")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["boxes.csv", "rig.toml"]
 
 
-def test_three_thousand_cameras_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_three_thousand_cameras_are_refused(tmp_path: Path, refusal: Command) -> None:
     camera = RIG[RIG.index("[[camera]]") :]
     cameras = "".join(camera.replace("cam1", f"cam{k}") for k in range(3000))
     path = write_rig(tmp_path)
     path.write_text(RIG[: RIG.index("[[camera]]")] + cameras)
-    assert "at most 256" in refusal(capsys, "run", path, "-o", tmp_path / "q.h5")
+    assert "at most 256" in refusal("run", path, "-o", tmp_path / "q.h5")
 
 
 def test_a_polygon_of_a_thousand_corners_works(tmp_path: Path) -> None:
@@ -78,20 +76,17 @@ def test_a_polygon_of_a_thousand_corners_works(tmp_path: Path) -> None:
     np.testing.assert_array_equal(grid.inside(), near)
 
 
+BAD_BOXES = ("2000000000,1,1,5,5", "0,1e999,1,5,5", "0,1,1,1e300,5", "0,1,1,-5,5", "\u0663,1,1,5,5")
+
+
 @pytest.mark.parametrize(
-    "rows",
-    ["2000000000,1,1,5,5", "0,1e999,1,5,5", "0,1,1,1e300,5", "0,1,1,-5,5", f"{'9' * 5000},1,1,5,5", "\u0663,1,1,5,5"],
+    ("rows", "message"),
+    [*((row, "line 2") for row in BAD_BOXES), (f"{'9' * 5000},1,1,5,5", ""), ("0,1,1,5,5\n" * 100_000, "boxes in")],
 )
-def test_boxes_beyond_the_limits_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: str) -> None:
+def test_boxes_beyond_the_limits_are_refused(tmp_path: Path, refusal: Command, rows: str, message: str) -> None:
     rig = write_rig(tmp_path)
     (tmp_path / "boxes.csv").write_text(f"frame,left,top,width,height\n{rows}\n")
-    refusal(capsys, "run", rig, "-o", tmp_path / "q.h5")
-
-
-def test_a_hundred_thousand_boxes_in_a_frame_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rig = write_rig(tmp_path)
-    (tmp_path / "boxes.csv").write_text("frame,left,top,width,height\n" + "0,1,1,5,5\n" * 100_000)
-    assert "boxes in" in refusal(capsys, "run", rig, "-o", tmp_path / "q.h5")
+    assert message in refusal("run", rig, "-o", tmp_path / "q.h5")
 
 
 def test_a_file_with_a_superscript_in_its_name_is_ordered(tmp_path: Path) -> None:
@@ -104,15 +99,9 @@ def test_a_file_with_a_superscript_in_its_name_is_ordered(tmp_path: Path) -> Non
     assert [part.path.name for part in parts] == ["a1²2.avi", "a9²2.avi", "a10²2.avi"]
 
 
-@pytest.mark.parametrize("points", [300_000])
-def test_hundreds_of_thousands_of_points_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], points: int
-) -> None:
-    (tmp_path / "p.csv").write_text("camera,u,v,x,y\n" + "cam1,1,1,1,1\n" * points)
-    refusal(
-        capsys, *("calibrate", "points", tmp_path / "p.csv", "-o", tmp_path / "r.toml", "--area=0,0,1,1"),
-        *("--frame-rate", "5", "--size", "64,48"),
-    )  # fmt: skip
+def test_hundreds_of_thousands_of_points_are_refused(tmp_path: Path, refusal: Command) -> None:
+    (tmp_path / "p.csv").write_text("camera,u,v,x,y\n" + "cam1,1,1,1,1\n" * 300_000)
+    refusal("calibrate", "points", tmp_path / "p.csv", "-o", tmp_path / "r.toml", *SCENE, "--size=64,48")
 
 
 # Calibrations
@@ -164,27 +153,17 @@ def test_numpy_headers_are_not_believed(header: str) -> None:
     refused(ValueError, "header", parse_npy, data)
 
 
-def test_a_small_archive_that_unpacks_to_gigabytes_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_small_archive_that_unpacks_to_gigabytes_is_refused(tmp_path: Path, refusal: Command) -> None:
     with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.npy", bytes(200_000_000))
-    said = refusal(
-        capsys, *("calibrate", "import", "matrix", tmp_path / "a.npz", "-o", tmp_path / "r.toml"),
-        *("--area=0,0,1,1", "--frame-rate", "5", "--size", "64,48", "--names", "a"),
-    )  # fmt: skip
-    assert "unpacked" in said
+    options = (*SCENE, "--size=64,48", "--names=a")
+    assert "unpacked" in refusal(
+        "calibrate", "import", "matrix", tmp_path / "a.npz", "-o", tmp_path / "r.toml", *options
+    )
 
 
-NVIDIA = {
-    "sensors": [
-        {
-            "id": "c",
-            "cameraMatrix": np.eye(3, 4).tolist(),
-            "attributes": [{"name": "frameWidth", "value": "9" * 5000}, {"name": "frameHeight", "value": "9"}],
-        }
-    ]
-}
+ATTRIBUTES = [{"name": "frameWidth", "value": "9" * 5000}, {"name": "frameHeight", "value": "9"}]
+NVIDIA = {"sensors": [{"id": "c", "cameraMatrix": np.eye(3, 4).tolist(), "attributes": ATTRIBUTES}]}
 
 
 @pytest.mark.parametrize(
@@ -204,13 +183,11 @@ NVIDIA = {
     ],
 )  # fmt: skip
 def test_calibrations_are_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], format: str, suffix: str, text: str
+    tmp_path: Path, refusal: Command, format: str, suffix: str, text: str
 ) -> None:
     (tmp_path / f"a{suffix}").write_text(text)
-    refusal(
-        capsys, *("calibrate", "import", format, tmp_path / f"a{suffix}", "-o", tmp_path / "rig.toml"),
-        *("--area=0,0,1,1", "--frame-rate", "5", "--unit", "m", "--up=+z"),
-    )  # fmt: skip
+    calibration, rig = tmp_path / f"a{suffix}", tmp_path / "rig.toml"
+    refusal("calibrate", "import", format, calibration, "-o", rig, *SCENE, "--unit=m", "--up=+z")
     assert not (tmp_path / "rig.toml").exists()
 
 
@@ -241,11 +218,11 @@ def test_playlists_are_no_videos(tmp_path: Path, text: str) -> None:
     refused(InputError, "playlist", read_video_size, tmp_path / "a.avi")
 
 
-def test_pipes_are_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pipes_are_not_waited_for(tmp_path: Path, refusal: Command) -> None:
     rig = write_rig(tmp_path)
     (tmp_path / "boxes.csv").unlink()
     os.mkfifo(tmp_path / "boxes.csv")
-    refusal(capsys, "run", rig, "-o", tmp_path / "q.h5")
+    refusal("run", rig, "-o", tmp_path / "q.h5")
 
 
 def test_ffmpeg_is_told_to_open_files_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,12 +248,7 @@ def test_damaged_pictures_are_answered_in_one_line(tmp_path: Path) -> None:
         data = bytearray(cv2.imencode(suffix, picture)[1])
         data[len(data) // 2 : len(data) // 2 + 3000] = bytes(3000)
         (tmp_path / f"a{suffix}").write_bytes(data[:-2000])
-        program = "import sys; from stseg.commands.main import main; sys.exit(main())"
-        done = subprocess.run(
-            [sys.executable, "-c", program, "calibrate", "page", f"a{suffix}", "-o", "p.html", "--overwrite"],
-            cwd=tmp_path, capture_output=True, text=True, check=False,
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
-        )  # fmt: skip
+        done = process(COMMAND, "calibrate", "page", f"a{suffix}", "-o", "p.html", "--overwrite", cwd=tmp_path)
         assert done.returncode in (0, 2)
         assert done.stderr.count("\n") == (done.returncode == 2), done.stderr
 

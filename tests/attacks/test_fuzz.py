@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 from fuzz.runner import fuzz
-from fuzz.target import Target, answer
-from fuzz.targets import TARGETS
+from fuzz.targets import TARGETS, Target, answer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -23,8 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fuzz.target import Target, answer
-from fuzz.targets import TARGETS
+from fuzz.targets import TARGETS, Target, answer
 
 SECONDS = 10.0
 """Longest CPU time that one file may take."""

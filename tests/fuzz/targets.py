@@ -1,9 +1,11 @@
-"""One target for each parser and reader: a folder with the file, and the call that reads it."""
+"""One target for each parser and reader: a valid file, and the call that reads it."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 
@@ -11,15 +13,15 @@ import numpy as np
 from run_files import small_trajectory, write_small_run
 
 from fuzz import corpus
-from fuzz.corpus import BOXES
-from fuzz.detection_targets import CAMERA, DETECTION_TARGETS, frames
-from fuzz.mutations import mutated_objects
-from fuzz.target import Target, plain
+from fuzz.corpus import GREY, RAMP, Maker, encoded, text
+from fuzz.mutations import mutated, mutated_objects
 from stseg.calibration.points.point_fit import Points, fit_points
 from stseg.commands.calibrate.page import calibrate_page
 from stseg.commands.correct import correct
 from stseg.commands.measure import measure
 from stseg.commands.review import review
+from stseg.errors import StsegError
+from stseg.geometry import Camera
 from stseg.identities.review.corrections import ACTIONS, Answer, solve_corrections
 from stseg.io.answers import read_answers, read_names
 from stseg.io.areas import read_lines, read_polygons
@@ -31,8 +33,9 @@ from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.live_tables import CorrectionTable, LiveTable
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.pictures import read_picture
-from stseg.io.recording.recording import Source
+from stseg.io.recording.recording import Source, SourceKind
 from stseg.io.recording.rigs import parse_rig, read_recording
+from stseg.io.recording.streams import open_stream
 from stseg.io.recording.video.video_stream import VideoStream
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
@@ -40,23 +43,110 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.measures.areas import Line, Zone
 from stseg.records.tables import Tracks
 
+Reader = Callable[[Path], object]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader that is fuzzed.
+
+    Attributes
+    ----------
+    name
+        Of the target; its suffix is that of the file.
+    read
+        Reads a file; raises StsegError for what it does not take.
+    make
+        Makes a valid file, which `read` takes without an error; the text of the target's name where it is None.
+    mutate
+        Makes another file of a valid one.
+    """
+
+    name: str
+    read: Reader
+    make: Maker | None = None
+    mutate: Callable[[bytes, np.random.Generator], bytes] = mutated
+
+    @property
+    def suffix(self) -> str:
+        """Of its files."""
+        return Path(self.name).suffix
+
+    def valid(self, folder: Path) -> bytes:
+        """The valid file."""
+        return text(self.name) if self.make is None else self.make(folder)
+
+
+def answer(target: Target, path: Path) -> str:
+    """The answer to a file: nothing, or one line; anything else than StsegError is raised."""
+    try:
+        target.read(path)
+    except StsegError as error:
+        line = str(error)
+        assert "\n" not in line.strip() or len(line) < 1000, line
+        return line
+    return ""
+
+
+SIZE = (64, 48)
+CAMERA = Camera("cam1", SIZE, np.eye(3), np.array([0.0, 0.0, -1.0]))
+OPTIONS = ImportOptions(SIZE, "m", 1.75)
 _GROUND = np.array([[0.1, 0.1], [0.3, 0.2], [5.0, 5.0]])
-OPTIONS = ImportOptions((64, 48), "m", 1.75)
+_FRAMES = 20
+_NOTES = {"config": {"a": 1}, "rig": {"b": "c"}}
 
 
-def _importer(format: str) -> Callable[[Path], object]:
+def _frames_of(source: Source) -> None:
+    """Read the first frames."""
+    stream = open_stream(source, CAMERA)
+    for _ in range(_FRAMES):
+        if stream.read() is None:
+            break
+    stream.close()
+
+
+def _frames(kind: SourceKind) -> Reader:
+    return lambda path: _frames_of(Source(kind, path))
+
+
+def _mapped(path: Path) -> None:
+    _frames_of(Source("boxes", path, columns=(("frame", "t"), ("left", "x1"), ("score", "conf")), classes=("person",)))
+
+
+def _images_of_coco(path: Path) -> None:
+    results = path.with_name("results.json")
+    results.write_bytes(text("coco.json"))
+    _frames_of(Source("boxes", results, image_list=path, select="a_*"))
+
+
+def _in_folder(name: str, kind: SourceKind = "boxes", first: str = "", view: int | None = None) -> Reader:
+    """The file as one of a folder, under a name that numbers a frame; the text of that name may lie beside it."""
+
+    def read(path: Path) -> None:
+        folder = path.with_name("frames")
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        if first:
+            (folder / "a_0.txt").write_bytes(text(first))
+        (folder / name).write_bytes(path.read_bytes())
+        _frames_of(replace(Source(kind, folder), view=view))
+
+    return read
+
+
+def _importer(format: str) -> Reader:
     return lambda path: read_cameras(format, [path], OPTIONS)
+
+
+def _picture(kind: SourceKind) -> Reader:
+    return lambda path: read_picture(path, kind, SIZE, "")
 
 
 def _video(path: Path) -> None:
     stream = VideoStream(Source("video", path), CAMERA)
     stream.times()
     stream.close()
-    frames("video")(path)
-
-
-def _picture(path: Path) -> None:
-    read_picture(path, "images", (64, 48), "")
+    _frames("video")(path)
 
 
 def _run(path: Path) -> None:
@@ -75,7 +165,7 @@ def _used_run(path: Path) -> None:
     """Commands that use its tables together; `report` takes too long here."""
     _run(path)
     answers = path.with_name("answers.csv")
-    answers.write_bytes(corpus.ANSWERS)
+    answers.write_bytes(text("answers.csv"))
     with redirect_stdout(StringIO()):
         review(path, output=path.with_name("review.html"), overwrite=True)
         measure(path, output=path.with_name("measures"), overwrite=True)
@@ -84,17 +174,17 @@ def _used_run(path: Path) -> None:
 
 def _streams(path: Path) -> None:
     rig = path.with_name("rig.toml")
-    rig.write_bytes(corpus.RIG)
-    path.with_name("boxes.csv").write_bytes(BOXES)
+    rig.write_bytes(text("rig.toml"))
+    path.with_name("boxes.csv").write_bytes(text("boxes.csv"))
     with WorkFolder(path.with_name("q.h5"), {}) as work:
         (work.path / "streams.npz").write_bytes(path.read_bytes())
         work.streams(read_recording(rig))
 
 
 def _begun(path: Path) -> None:
-    with WorkFolder(path.with_name("q.h5"), {"config": {"a": 1}, "rig": {"b": "c"}}) as work:
+    with WorkFolder(path.with_name("q.h5"), _NOTES) as work:
         (work.path / "begun.json").write_bytes(path.read_bytes())
-    with WorkFolder(path.with_name("q.h5"), {"config": {"a": 1}, "rig": {"b": "c"}}):
+    with WorkFolder(path.with_name("q.h5"), _NOTES):
         pass
 
 
@@ -109,20 +199,6 @@ def _live_corrections(path: Path) -> None:
     copy = path.with_name("live_corrections.csv")
     copy.write_bytes(path.read_bytes())
     CorrectionTable(copy, 90)
-
-
-def _small_run(folder: Path) -> bytes:
-    """A run with names."""
-    answers, output = folder / "answers.csv", folder / "corrected.h5"
-    answers.write_bytes(corpus.ANSWERS)
-    with redirect_stdout(StringIO()):
-        correct(write_small_run(folder / "small.h5", overwrite=True), answers, output=output, overwrite=True)
-    return output.read_bytes()
-
-
-def _small_run_beside(path: Path) -> Path:
-    run = path.with_name("small.h5")
-    return run if run.exists() else write_small_run(run)
 
 
 def _zones(path: Path) -> None:
@@ -144,14 +220,15 @@ def _answers(path: Path) -> None:
 
 
 def _names(path: Path) -> None:
-    run = read_run(_small_run_beside(path)).with_names(read_names(path))
+    small = path.with_name("small.h5")
+    run = read_run(small if small.exists() else write_small_run(small)).with_names(read_names(path))
     with replacing(path.with_name("out"), overwrite=True) as part:
         exports.write_tracks("geojson", part, run)
 
 
 def _points(path: Path) -> None:
     for table in read_points(path):
-        fit_points(table.camera, (64, 48), Points(table.pixel, table.place[:, :2], table.place[:, 2]), None)
+        fit_points(table.camera, SIZE, Points(table.pixel, table.place[:, :2], table.place[:, 2]), None)
 
 
 def _calibration_page(path: Path) -> None:
@@ -160,47 +237,65 @@ def _calibration_page(path: Path) -> None:
 
 
 TARGETS = (
-    *DETECTION_TARGETS,
-    Target("rig.toml", plain(corpus.RIG), lambda path: parse_rig(path.read_text("utf-8", "replace"), path)),
-    Target("rig_file.toml", plain(corpus.RIG), read_recording),
-    Target("config.toml", plain(corpus.CONFIG), read_config),
-    Target("tracks.csv", plain(corpus.TRACKS), read_tracks_csv),
-    Target("points.csv", plain(corpus.POINTS), read_points),
-    Target("eight_points.csv", plain(corpus.EIGHT_POINTS), _points),
-    Target("zones.geojson", plain(corpus.ZONES), _zones),
-    Target("lines.geojson", plain(corpus.LINES), _lines),
-    Target("answers.csv", plain(corpus.ANSWERS), _answers),
-    Target("names.csv", plain(corpus.NAMES), _names),
-    Target("floor_plan.png", lambda _: corpus.floor_plan(".png"), _calibration_page),
-    Target("floor_plan.jpg", lambda _: corpus.floor_plan(".jpg"), _calibration_page),
-    Target("matrix.txt", plain(corpus.NUMBERS), _importer("matrix")),
-    Target("matrix.npy", lambda _: corpus.npy(), _importer("matrix")),
-    Target("matrix.npz", lambda _: corpus.npz(), _importer("matrix")),
-    Target("matrix.mat", lambda _: corpus.mat(), _importer("matrix")),
-    Target("matrix_hdf5.mat", corpus.matlab_hdf5, _importer("matrix")),
-    Target("opencv.xml", plain(corpus.OPENCV), _importer("opencv")),
-    Target("tsai.xml", plain(corpus.TSAI), _importer("tsai")),
-    Target("pom.txt", plain(corpus.POM), _importer("pom")),
-    Target("krt.json", plain(corpus.KRT), _importer("krt")),
-    Target("poses.toml", plain(corpus.POSES), _importer("anipose")),
-    Target("nvidia.json", plain(corpus.NVIDIA), _importer("nvidia")),
-    Target("kalibr.yaml", plain(corpus.KALIBR), _importer("kalibr")),
-    Target("run.h5", _small_run, _run),
-    Target("run_objects.h5", _small_run, _used_run, mutated_objects),
-    Target("streams.npz", lambda _: corpus.npz(), _streams),
-    Target("begun.json", plain(corpus.BEGUN), _begun),
-    Target("files.json", plain(corpus.NOTES), FileNotes),
-    Target("live.table.csv", plain(corpus.LIVE_TABLE), _live_table),
-    Target("live.corrections.csv", plain(corpus.LIVE_CORRECTIONS), _live_corrections),
-    Target("indexed.png", lambda _: corpus.png(True), lambda path: read_picture(path, "instances", (64, 48), "")),
-    Target("grey.png", lambda _: corpus.png(False), lambda path: read_picture(path, "instances", (64, 48), "")),
-    Target("mask.png", lambda _: corpus.png(True), lambda path: read_picture(path, "masks", (64, 48), "")),
-    *(
-        Target(f"colour{suffix}", plain(corpus.picture(suffix)), _picture)
-        for suffix in (".png", ".jpg", ".bmp", ".tiff", ".webp")
-    ),
-    Target("mjpeg.avi", lambda folder: corpus.video(folder, ".avi", "MJPG"), _video),
-    Target("mpeg4.mp4", lambda folder: corpus.video(folder, ".mp4", "mp4v"), _video),
+    Target("boxes.csv", _frames("boxes")),
+    Target("mot.txt", _frames("boxes")),
+    Target("mot_truth.txt", _frames("boxes")),
+    Target("mapped.csv", _mapped),
+    Target("boxes.parquet", _frames("boxes"), corpus.parquet),
+    Target("yolo.txt", _in_folder("a_1.txt", "boxes", "yolo.txt")),
+    Target("yolo_outlines.txt", _in_folder("a_1.txt", "instances")),
+    Target("yolo_names.yaml", _in_folder("data.yaml", "boxes", "yolo.txt")),
+    Target("yolo_frame.json", _in_folder("a_1.json")),
+    Target("yolo.json", _frames("instances")),
+    Target("yolo.jsonl", _frames("boxes")),
+    Target("mmdetection_frame.json", _in_folder("a_1.json", "instances")),
+    Target("mmdetection.json", _frames("boxes")),
+    Target("wildtrack.json", _in_folder("00000005.json", view=0)),
+    Target("coco.json", _frames("boxes")),
+    Target("coco_images.json", _images_of_coco, lambda _: text("coco_data.json")),
+    Target("coco_data.json", _frames("instances")),
+    Target("cvat.xml", _frames("instances")),
+    Target("cvat_images.xml", _frames("instances")),
+    Target("label_studio.json", _frames("instances")),
+    Target("label_studio_video.json", _frames("boxes")),
+    Target("via.json", _frames("instances")),
+    Target("rig.toml", lambda path: parse_rig(path.read_text("utf-8", "replace"), path)),
+    Target("rig_file.toml", read_recording, lambda _: text("rig.toml")),
+    Target("config.toml", read_config),
+    Target("tracks.csv", read_tracks_csv),
+    Target("points.csv", read_points),
+    Target("eight_points.csv", _points),
+    Target("zones.geojson", _zones),
+    Target("lines.geojson", _lines),
+    Target("answers.csv", _answers),
+    Target("names.csv", _names),
+    *(Target(f"floor_plan{suffix}", _calibration_page, encoded(suffix, GREY)) for suffix in (".png", ".jpg")),
+    Target("matrix.txt", _importer("matrix")),
+    Target("matrix.npy", _importer("matrix"), corpus.npy),
+    Target("matrix.npz", _importer("matrix"), corpus.npz),
+    Target("matrix.mat", _importer("matrix"), corpus.mat),
+    Target("matrix_hdf5.mat", _importer("matrix"), corpus.matlab_hdf5),
+    Target("opencv.xml", _importer("opencv")),
+    Target("tsai.xml", _importer("tsai")),
+    Target("pom.txt", _importer("pom")),
+    Target("krt.json", _importer("krt")),
+    Target("poses.toml", _importer("anipose")),
+    Target("nvidia.json", _importer("nvidia")),
+    Target("kalibr.yaml", _importer("kalibr")),
+    Target("run.h5", _run, corpus.small_run),
+    Target("run_objects.h5", _used_run, corpus.small_run, mutated_objects),
+    Target("streams.npz", _streams, corpus.npz),
+    Target("begun.json", _begun),
+    Target("files.json", FileNotes),
+    Target("live.table.csv", _live_table),
+    Target("live.corrections.csv", _live_corrections),
+    Target("indexed.png", _picture("instances"), corpus.indexed_png),
+    Target("grey.png", _picture("instances"), corpus.grey_png),
+    Target("mask.png", _picture("masks"), corpus.indexed_png),
+    *(Target(f"colour{suffix}", _picture("images"), encoded(suffix, RAMP))
+      for suffix in (".png", ".jpg", ".bmp", ".tiff", ".webp")),
+    Target("mjpeg.avi", _video, corpus.video(".avi", "MJPG")),
+    Target("mpeg4.mp4", _video, corpus.video(".mp4", "mp4v")),
 )  # fmt: skip
 """All of them."""
 
