@@ -14,7 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from run_files import CONFIG, small_recording, small_trajectory, write_small_run
+from recordings import COMMAND, ENVIRONMENT, process
+from refusals import Command
+from run_files import CONFIG, small_recording, small_trajectory
 
 import stseg
 from stseg.commands.inspect import event_counts_text
@@ -24,30 +26,6 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.records.tables import TRAJECTORY, Tracks
 from stseg.tasks.overview import summarise_run
 
-
-@pytest.fixture
-def run_path(tmp_path: Path) -> Path:
-    return write_small_run(tmp_path / "night.h5")
-
-
-def stseg_process(*arguments: str) -> subprocess.CompletedProcess[str]:
-    program = "import sys; from stseg.commands.main import main; sys.exit(main())"
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    return subprocess.run(
-        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, env=environment, check=False
-    )
-
-
-def silent_run(path: Path) -> Path:
-    """A run that found nobody and whose cells no view sees."""
-    recording = small_recording(path.parent)
-    with RunWriter(path, recording, np.zeros((3, 4, 6), np.uint8), CONFIG, overwrite=False) as writer:
-        volume = np.full((1, 3, 4, 6), np.nan, np.float32)
-        writer.append_frames(np.array([0]), volume, np.zeros(volume.shape, np.int32))
-        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
-    return path
-
-
 # The command line
 
 
@@ -56,19 +34,16 @@ def test_help_names_every_command_and_imports_none() -> None:
         "import sys; from stseg.commands.main import main; main(['--help']);"
         "print(*(name for name in ('numba', 'cv2', 'h5py', 'scipy') if name in sys.modules), file=sys.stderr)"
     )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    process = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
-    )
-    assert process.stderr.strip() == ""
+    found = process(program)
+    assert (found.returncode, found.stderr.strip()) == (0, "")
     for command in COMMANDS:
-        assert f" {command} " in process.stdout
+        assert f" {command} " in found.stdout
 
 
 def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
-    good = stseg_process("inspect", str(run_path))
+    good = process(COMMAND, "inspect", run_path)
     assert (good.returncode, good.stderr) == (0, "")
-    bad = stseg_process("inspect", str(tmp_path / "none.h5"))
+    bad = process(COMMAND, "inspect", tmp_path / "none.h5")
     assert (bad.returncode, bad.stdout) == (2, "")
     assert bad.stderr == f"stseg: error: {tmp_path / 'none.h5'}: found no such file, expected a run file\n"
 
@@ -77,25 +52,15 @@ def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
     ("arguments", "told"),
     [
         (["inspekt", "x.h5"], "command line: found 'inspekt', expected one of demo, run, inspect"),
+        (["inspekt"], "did you mean inspect?"),
         (["inspect"], "RUN"),
         (["inspect", "x.h5", "--jsn"], "--jsn"),
         (["export", "x.h5", "--to", "docx", "-o", "x.docx"], "--to: found 'docx', expected one of csv, parquet, mot"),
         (["--colour"], "--colour"),
     ],
 )
-def test_slips_on_the_command_line_are_one_line(
-    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("stseg: error: ")
-    assert said.count("\n") == 1
-    assert told in said
-
-
-def test_a_misspelt_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["inspekt"])
-    assert "did you mean inspect?" in capsys.readouterr().err
+def test_slips_on_the_command_line_are_one_line(arguments: list[str], told: str, refusal: Command) -> None:
+    assert told in refusal(*arguments)
 
 
 def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -107,24 +72,19 @@ def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert capsys.readouterr().err == "stseg: interrupted\n"
 
 
-def test_version_and_help_of_a_command(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"{stseg.__version__}\n"
-    assert main(["export", "--help"]) == 0
-    assert "MOTChallenge" in capsys.readouterr().out  # the long text, not the line of the list
+def test_version_and_help_of_a_command(stdout: Command) -> None:
+    assert stdout("--version") == f"{stseg.__version__}\n"
+    assert "MOTChallenge" in stdout("export", "--help")  # the long text, not the line of the list
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs a shell's pipe")
 def test_a_reader_that_has_seen_enough_is_no_error(run_path: Path) -> None:
-    program = "import sys; from stseg.commands.main import main; sys.exit(main())"
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    command = [sys.executable, "-c", program, "inspect", "--json", str(run_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        process.stdout.close()
-        assert process.stderr.read() == b""
-    assert process.returncode == 0
+    command = [sys.executable, "-c", COMMAND, "inspect", "--json", str(run_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=ENVIRONMENT) as running:
+        assert running.stdout is not None and running.stderr is not None
+        running.stdout.close()
+        assert running.stderr.read() == b""
+    assert running.returncode == 0
 
 
 # inspect
@@ -155,25 +115,23 @@ def test_inspect_counts_people_and_explains_ghosts(run_path: Path) -> None:
     assert overview.ghosts_denied_by == {"left": 1, "right": 0}
 
 
-def test_the_keys_of_the_json_are_documented(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["inspect", str(run_path), "--json"]) == 0
+def test_the_json_is_as_documented(run_path: Path, stdout: Command) -> None:
+    found = json.loads(stdout("inspect", run_path, "--json"))
+    assert (found["cameras"], found["tracks"][0]["frames"]) == (["left", "right"], 6)
     page = (Path(__file__).parents[2] / "docs" / "outputs.md").read_text("utf-8")
     _, _, listed = page.partition("## Keys of `stseg inspect --json`")
     cells = re.findall(r"^\| (`.*?`) \|", listed, re.MULTILINE)
-    assert re.findall(r"`(\w+)`", " ".join(cells)) == list(json.loads(capsys.readouterr().out))
+    assert re.findall(r"`(\w+)`", " ".join(cells)) == list(found)
 
 
-def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pictures = []
+def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, stdout: Command) -> None:
     texts = ("t=2.2,plane=0.9", "frame=11,plane=0.85", "t=2.4,plane=0.9", "t=2.2,plane=0", "frame=11,plane=all")
-    for k, text in enumerate(texts):
-        output = tmp_path / f"{k}.png"
-        assert main(["inspect", str(run_path), "--slice", text, "-o", str(output)]) == 0
-        pictures.append(output.read_bytes())
+    said = [stdout("inspect", run_path, "--slice", text, "-o", tmp_path / f"{k}.png") for k, text in enumerate(texts)]
+    pictures = [(tmp_path / f"{k}.png").read_bytes() for k in range(5)]
     assert pictures[0] == pictures[1]
     assert len(set(pictures)) == 4
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
-    assert "0.png: frame 11 (2.20 s), 0.90 m" in capsys.readouterr().out
+    assert "0.png: frame 11 (2.20 s), 0.90 m" in said[0]
 
 
 @pytest.mark.parametrize(
@@ -189,28 +147,23 @@ def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, capsys: pytest.C
     ],
 )
 def test_a_slice_out_of_range_is_told(
-    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+    run_path: Path, tmp_path: Path, refusal: Command, arguments: list[str], told: str
 ) -> None:
-    assert main(["inspect", str(run_path), *arguments, "-o", str(tmp_path / "slice.png")]) == 2
-    assert told in capsys.readouterr().err
+    assert told in refusal("inspect", run_path, *arguments, "-o", tmp_path / "slice.png")
     assert not (tmp_path / "slice.png").exists()
 
 
-def test_a_slice_needs_a_file_and_destroys_none(
-    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = ["inspect", str(run_path), "--slice", "t=2,plane=0"]
-    assert main(command) == 2
-    assert "-o SLICE.png with it" in capsys.readouterr().err
-    assert main(["inspect", str(run_path), "-o", str(tmp_path / "a.png")]) == 2
+def test_a_slice_needs_a_file_and_destroys_none(run_path: Path, tmp_path: Path, refusal: Command) -> None:
+    command = ("inspect", run_path, "--slice", "t=2,plane=0")
+    assert "-o SLICE.png with it" in refusal(*command)
+    refusal("inspect", run_path, "-o", tmp_path / "a.png")
     (tmp_path / "old.png").write_text("precious")
-    assert main([*command, "-o", str(tmp_path / "old.png")]) == 2
+    refusal(*command, "-o", tmp_path / "old.png")
     assert (tmp_path / "old.png").read_text() == "precious"
 
 
-def test_inspect_on_a_screen(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["inspect", str(run_path)]) == 0
-    screen = capsys.readouterr().out
+def test_inspect_on_a_screen(run_path: Path, stdout: Command) -> None:
+    screen = stdout("inspect", run_path)
     for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
         assert said in screen
     assert re.search(r"left +20\.0 +2\.5 +40\.0 +1 *\n", screen)  # of each view, how it errs and what it denies
@@ -220,18 +173,13 @@ def test_inspect_counts_a_merge_and_its_split_as_one_encounter() -> None:
     assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
 
 
-def test_inspect_as_json(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["inspect", str(run_path), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["cameras"] == ["left", "right"]
-    assert found["tracks"][0]["frames"] == 6
-
-
-def test_inspect_warns_of_an_empty_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    overview = summarise_run(read_run(silent_run(tmp_path / "silent.h5")))
-    assert overview.warnings == ["no person was found", "no view sees any cell"]
-    assert main(["inspect", str(tmp_path / "silent.h5")]) == 0
-    assert "warning: no person was found" in capsys.readouterr().out
+def test_inspect_warns_of_an_empty_run(tmp_path: Path, stdout: Command) -> None:
+    path, volume = tmp_path / "silent.h5", np.full((1, 3, 4, 6), np.nan, np.float32)
+    with RunWriter(path, small_recording(tmp_path), np.zeros((3, 4, 6), np.uint8), CONFIG, overwrite=False) as writer:
+        writer.append_frames(np.array([0]), volume, np.zeros(volume.shape, np.int32))
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    assert summarise_run(read_run(path)).warnings == ["no person was found", "no view sees any cell"]
+    assert "warning: no person was found" in stdout("inspect", path)
 
 
 # export
@@ -256,26 +204,22 @@ def test_export_to_pedpy_and_mot(run_path: Path, tmp_path: Path) -> None:
     assert len(lines) == len(small_trajectory())
 
 
-def test_export_destroys_nothing(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_export_destroys_nothing(run_path: Path, tmp_path: Path, refusal: Command) -> None:
     target = tmp_path / "tracks.csv"
     target.write_text("precious")
     command = ["export", str(run_path), "--to", "csv", "-o", str(target)]
-    assert main(command) == 2
-    assert "exists" in capsys.readouterr().err
+    assert "exists" in refusal(*command)
     assert target.read_text() == "precious"
     assert main([*command, "--overwrite"]) == 0
     assert target.read_text().startswith("frame,id,x,y")
-    assert main(["export", str(run_path), "--to", "csv", "-o", str(run_path), "--overwrite"]) == 2
-    assert "the run file itself" in capsys.readouterr().err
+    assert "the run file itself" in refusal("export", run_path, "--to", "csv", "-o", run_path, "--overwrite")
     assert len(read_run(run_path).frames) == 6
 
 
-def test_evaluate_takes_a_run_file(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_evaluate_takes_a_run_file(run_path: Path, tmp_path: Path, stdout: Command) -> None:
     truth = tmp_path / "truth.csv"
-    assert main(["export", str(run_path), "--to", "csv", "-o", str(truth)]) == 0
-    capsys.readouterr()
-    assert main(["evaluate", str(run_path), str(truth), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["MODA"] == 100
+    stdout("export", run_path, "--to", "csv", "-o", truth)
+    assert json.loads(stdout("evaluate", run_path, truth, "--json"))["MODA"] == 100
 
 
 # The demo
@@ -302,10 +246,9 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
     return Demo(folder, printed.getvalue())
 
 
-def test_people_are_tracked(demo: Demo, capsys: pytest.CaptureFixture[str]) -> None:
+def test_people_are_tracked(demo: Demo, stdout: Command) -> None:
     truth = demo.folder / "scene" / "truth.csv"
-    assert main(["evaluate", str(demo.folder / "run.h5"), str(truth), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["MODA"] >= LEAST_MODA
+    assert json.loads(stdout("evaluate", demo.folder / "run.h5", truth, "--json"))["MODA"] >= LEAST_MODA
     run = read_run(demo.folder / "run.h5")
     assert set(run.frames) >= set(read_tracks_csv(truth)["frame"])
     assert all(source.source.kind == "video" and source.background for source in run.recording.sources)
@@ -325,10 +268,9 @@ def test_it_scores_and_names_what_to_open(demo: Demo) -> None:
     assert all(Path(name).is_file() for name in listed)
 
 
-def test_a_folder_with_files_in_it_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_with_files_in_it_is_left_alone(tmp_path: Path, refusal: Command) -> None:
     (tmp_path / "mine.txt").write_text("precious")
-    assert main(["demo", str(tmp_path)]) == 2
-    assert "--overwrite" in capsys.readouterr().err
+    assert "--overwrite" in refusal("demo", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
     assert main(["demo", str(tmp_path / "mine.txt")]) == 2
     assert (tmp_path / "mine.txt").read_text() == "precious"

@@ -10,9 +10,8 @@ from typing import Any, Literal
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusals import refused
+from refusals import Command, refused
 
-from stseg.commands.main import main
 from stseg.config import BodyConfig, Config
 from stseg.config.keys import USER_KEYS, describe, require_effect, values
 from stseg.config.ranges import require
@@ -240,9 +239,7 @@ def test_a_value_with_effect_is_taken(assignments: tuple[str, ...], tracker: str
     require_effect(read_config(None, assignments), tracker)
 
 
-def test_the_command_prints_a_file_that_a_run_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["config", "--set", "body.height_mean=1.2", "--expert"]) == 0
-    printed = capsys.readouterr().out
+def test_the_command_prints_a_file_that_a_run_takes(tmp_path: Path, refusal: Command, stdout: Command) -> None:
+    printed = stdout("config", "--set", "body.height_mean=1.2", "--expert")
     assert read(tmp_path / "c.toml", printed) == read_config(None, ["body.height_mean=1.2"])
-    assert main(["config", "--set", "body.height=1"]) == 2
-    assert "did you mean heights?" in capsys.readouterr().err
+    assert "did you mean heights?" in refusal("config", "--set", "body.height=1")

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import run_files
 from recordings import FRAMES, OPTIONS, assert_same, compiled_only, track
-from refusals import refused
+from refusals import Command, refused
 from run_files import write_small_run
 from scenes import box_frame_sets, corner_cameras, rig_of, walkers
 
@@ -258,11 +258,8 @@ def test_what_the_other_process_compiles_is_noted() -> None:
 
 
 @compiled_only
-def test_the_file_becomes_as_large_as_planned(
-    rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["plan", str(rig_path), *OPTIONS, "--workers", "1", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+def test_the_file_becomes_as_large_as_planned(rig_path: Path, tmp_path: Path, stdout: Command) -> None:
+    told = json.loads(stdout("plan", rig_path, *OPTIONS, "--workers", "1", "--json"))
     assert (told["frames"], told["segments"], told["workers"]) == (FRAMES, 6, 1)
     assert told["seconds"] == pytest.approx(sum(told[k] for k in ("counting", "learning", "tracking", "joining")))
     assert min(told["tracking"], told["joining"]) > 0
@@ -271,9 +268,8 @@ def test_the_file_becomes_as_large_as_planned(
 
 
 @compiled_only
-def test_it_is_told_in_words(rig_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", str(rig_path), *OPTIONS, "--frames", "0:20", "--workers", "3"]) == 0
-    told = capsys.readouterr().out
+def test_it_is_told_in_words(rig_path: Path, stdout: Command) -> None:
+    told = stdout("plan", rig_path, *OPTIONS, "--frames", "0:20", "--workers", "3")
     assert "20 frames" in told
     assert "3 workers" in told
     assert "MiB an hour" in told

@@ -25,6 +25,7 @@ import shapely.geometry
 import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Command
 from run_files import CONFIG, FRAMES, small_recording, small_trajectory, write_small_run
 
 from stseg.arrays import Rows
@@ -98,9 +99,8 @@ def test_every_format_takes_a_run_without_tracks(empty_run: Run, path: Path, nam
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_help_and_pages_name_every_format(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "--help"]) == 0
-    assert re.search(rf"(^|\s){name}:", capsys.readouterr().out, re.MULTILINE)
+def test_help_and_pages_name_every_format(name: str, stdout: Command) -> None:
+    assert re.search(rf"(^|\s){name}:", stdout("export", "--help"), re.MULTILINE)
     page = (Path(__file__).parents[2] / "docs" / "outputs.md").read_text("utf-8")
     assert re.search(rf"^\| `{name}` \|", page, re.MULTILINE)
 
@@ -140,12 +140,11 @@ def test_tracks_with_gaps_come_back_place_by_place(
 
 @pytest.mark.parametrize(("name", "library"), [("parquet", "pyarrow"), ("movement", "h5netcdf")])
 def test_a_library_that_is_missing_is_asked_for_in_one_line(
-    run: Run, path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str, library: str
+    run: Run, path: Path, monkeypatch: pytest.MonkeyPatch, refusal: Command, name: str, library: str
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
-    assert main(["export", str(run.path), "--to", name, "-o", str(path)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"{library}: found no such library, expected it: pip install 'stseg[{name}]'" in line
+    said = f"{library}: found no such library, expected it: pip install 'stseg[{name}]'"
+    assert said in refusal("export", run.path, "--to", name, "-o", path)
     assert not list(path.parent.iterdir())
     with pytest.raises(ConfigError, match="Python: nowhere: found no such library"):
         load_extra("nowhere.at_all", "parquet")

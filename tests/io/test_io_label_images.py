@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from refusals import refused
+from refusals import Command, refused
 from scenes import box_frame_sets, looking, mask_frame_sets, rig_of, standing_at, walkers
 
 from stseg.arrays import Boxes, Bytes, Rows
@@ -162,16 +162,14 @@ def box_source(path: Path) -> CameraSource:
     return CameraSource(Source("boxes", path, frames=FRAMES))
 
 
-def test_what_the_user_can_mend_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str], run_path: Path) -> None:
+def test_what_the_user_can_mend_is_said(tmp_path: Path, refusal: Command, run_path: Path) -> None:
     boxes = tmp_path / "boxes"
     boxes.mkdir()
     path = write_run(boxes / "run.h5", (box_source(boxes / "east.csv"),) * 2, walkers(FRAMES))
-    assert main(["labels", str(path), "-o", str(tmp_path / "out")]) == 2
-    assert "found boxes alone, expected a camera that delivers pixels" in capsys.readouterr().err
-    assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--frames", "3:9"]) == 2
-    assert "--frames" in capsys.readouterr().err
-    assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--set", "labels.samples=0"]) == 2
-    assert "labels.samples: found 0" in capsys.readouterr().err
+    said = "found boxes alone, expected a camera that delivers pixels"
+    assert said in refusal("labels", path, "-o", tmp_path / "out")
+    assert "--frames" in refusal("labels", run_path, "-o", tmp_path / "out", "--frames", "3:9")
+    assert "labels.samples: found 0" in refusal("labels", run_path, "-o", tmp_path / "out", "--set", "labels.samples=0")
     assert not (tmp_path / "out").exists()
 
 

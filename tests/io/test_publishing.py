@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusals import refused
+from refusals import Command, refused
 
 from stseg.arrays import Rows
-from stseg.commands.main import main
 from stseg.errors import ConfigError
 from stseg.io.live.publishing import Publisher, receiver_of
 from stseg.records.tables import TRAJECTORY
@@ -153,10 +152,9 @@ def test_other_addresses_are_refused(address: str) -> None:
     refused(ConfigError, r"expected mqtt://HOST\[:PORT\]/TOPIC", receiver_of, address)
 
 
-def test_publishing_needs_follow(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_publishing_needs_follow(tmp_path: Path, refusal: Command) -> None:
     (tmp_path / "rig.toml").write_text("")
-    assert main(["run", str(tmp_path / "rig.toml"), "-o", "x.h5", "--publish", "http://127.0.0.1:9/"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    refusal("run", tmp_path / "rig.toml", "-o", "x.h5", "--publish", "http://127.0.0.1:9/")
 
 
 @contextmanager

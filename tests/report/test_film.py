@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 import run_files
+from refusals import Command
 
 from stseg.arrays import Bytes, Rows
 from stseg.commands.main import main
@@ -89,11 +90,8 @@ def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -
     assert (pictures[1][:, 1280:] == track_colour(1)).all(axis=-1).any()
 
 
-def test_the_film_has_the_frames_that_were_asked_for(
-    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4"), "--camera-images"]) == 0
-    assert "a.mp4: 6 frames" in capsys.readouterr().out
+def test_the_film_has_the_frames_that_were_asked_for(run_path: Path, tmp_path: Path, stdout: Command) -> None:
+    assert "a.mp4: 6 frames" in stdout("report", run_path, "--video", tmp_path / "a.mp4", "--camera-images")
     whole = frames_of(tmp_path / "a.mp4")
     assert len(whole) == 6
     darkened = tuple(round(0.85 * tone) for tone in VIVID)
@@ -130,14 +128,13 @@ def test_without_the_flag_a_film_holds_no_camera_pixel(run_path: Path, tmp_path:
 def test_slips_are_told_before_any_work(
     run_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    refusal: Command,
     arguments: list[str],
     message: str,
 ) -> None:
     monkeypatch.chdir(run_path.parent)
     before = set(run_path.parent.iterdir())
-    assert main(["report", str(run_path), *arguments]) == 2
-    assert message in capsys.readouterr().err
+    assert message in refusal("report", run_path, *arguments)
     assert set(run_path.parent.iterdir()) == before
 
 
