@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -37,188 +37,48 @@ size = [80, 60]
 projection = [[40.0, 0, -39.5, 200], [0, -40.0, -29.5, 150], [0, 0, -1.0, 5]]
 source = { kind = "boxes", path = "PATH" }
 """
-Writer = Callable[[Path], Source]
 
 
-def source(path: Path, **more: Any) -> Source:
-    return Source("boxes", path, **more)
-
-
-def corners(box: tuple[float, ...]) -> list[float]:
-    return [box[0], box[1], box[0] + box[2], box[1] + box[3]]
-
-
-def dump(path: Path, data: Any) -> Path:
-    path.write_text(json.dumps(data))
-    return path
-
-
-def yolo_text(folder: Path) -> Source:
-    (folder / "labels").mkdir()
-    (folder / "classes.txt").write_text("person\ncar\n")
-    for frame, boxes in BOXES.items():
-        lines = [f"0 {(x + w / 2) / 80} {(y + h / 2) / 60} {w / 80} {h / 60} {score}\n" for x, y, w, h, score in boxes]
-        (folder / f"labels/walk_{frame + 1}.txt").write_text("".join(lines) + "1 0.5 0.5 0.1 0.1 0.9\n")
-    return source(folder / "labels", first_frame=1, classes=("person",))
-
-
-def yolo_json(folder: Path) -> Source:
-    keys = ("x1", "y1", "x2", "y2")
-    frames = [
-        [{"name": "person", "class": 0, "confidence": b[4], "box": dict(zip(keys, corners(b), strict=True))}
-         for b in BOXES.get(frame, [])]
-        for frame in range(3)
-    ]  # fmt: skip
-    (folder / "r.jsonl").write_text("\n".join(map(json.dumps, frames)))
-    return source(folder / "r.jsonl")
-
-
-def coco_rows() -> list[dict[str, Any]]:
-    return [
-        {"image_id": 7 + frame, "category_id": 1, "bbox": list(box[:4]), "score": box[4]}
-        for frame, boxes in BOXES.items()
-        for box in boxes
-    ]
-
-
-def coco_images() -> dict[str, Any]:
-    images = [{"id": 7 + frame, "file_name": f"cam1/{10 * frame:06d}.jpg"} for frame in range(3)]
-    other = [{"id": 90, "file_name": "cam2/000000.jpg"}]
-    return {"images": images + other, "annotations": [], "categories": [{"id": 1, "name": "person"}]}
-
-
-def coco_results(folder: Path) -> Source:
-    images = dump(folder / "images.json", coco_images())
-    path = dump(folder / "results.json", coco_rows())
-    return source(path, image_list=images, select="cam1/*", classes=("Person",))
-
-
-def coco_dataset(folder: Path) -> Source:
-    return source(dump(folder / "data.json", coco_images() | {"annotations": coco_rows()}), select="cam1/*")
-
-
-def mmdetection(folder: Path) -> Source:
-    (folder / "preds").mkdir()
-    for frame in range(3):
-        boxes = BOXES.get(frame, [])
-        own = {"labels": [0] * len(boxes), "scores": [b[4] for b in boxes], "bboxes": [corners(b) for b in boxes]}
-        dump(folder / f"preds/{frame:06d}.json", own)
-    return source(folder / "preds", classes=("0",))
-
-
-def wildtrack(folder: Path) -> Source:
-    (folder / "annotations_positions").mkdir()
-    for frame in range(3):
-        people = []
-        for k, box in enumerate(BOXES.get(frame, [])):
-            x0, y0, x1, y1 = (int(value) for value in corners(box))
-            shown = {"viewNum": 1, "xmin": x0, "ymin": y0, "xmax": x1, "ymax": y1}
-            hidden = {"viewNum": 0, "xmin": -1, "ymin": -1, "xmax": -1, "ymax": -1}
-            people.append({"personID": k, "positionID": 5, "views": [hidden, shown]})
-        dump(folder / f"annotations_positions/{5 * frame:08d}.json", people)
-    return source(folder / "annotations_positions", view=1)
-
-
-def cvat(folder: Path) -> Source:
-    tracks = [
-        f'<track id="{frame}{k}" label="person">'
-        f'<box frame="{frame}" outside="0" xtl="{b[0]}" ytl="{b[1]}" xbr="{b[0] + b[2]}" ybr="{b[1] + b[3]}"/>'
-        f'<box frame="{frame + 1}" outside="1" xtl="0" ytl="0" xbr="1" ybr="1"/></track>'
-        for frame, boxes in BOXES.items()
-        for k, b in enumerate(boxes)
-    ]
-    text = f"<annotations><meta><job><size>3</size></job></meta>{''.join(tracks)}</annotations>"
-    (folder / "video.xml").write_text(text)
-    return source(folder / "video.xml", classes=("person",))
-
-
-def motchallenge_truth(folder: Path) -> Source:
-    boxes = [(frame + 1, *box[:4]) for frame, own in BOXES.items() for box in own]
-    rows = [f"{frame},0,{left},{top},{width},{height},1,1,0.8\n" for frame, left, top, width, height in boxes]
-    (folder / "gt.txt").write_text("".join(rows) + "2,9,1,1,5,5,0,1,1\n")
-    return source(folder / "gt.txt", first_frame=1)
-
-
-def label_studio(folder: Path) -> Source:
-    def result(box: tuple[float, ...]) -> dict[str, Any]:
-        x, y, w, h = box[0] / 0.8, box[1] / 0.6, box[2] / 0.8, box[3] / 0.6
-        value = {"x": x, "y": y, "width": w, "height": h, "rectanglelabels": ["person"]}
-        return {"type": "rectanglelabels", "value": value}
-
-    tasks = [
-        {"data": {"image": f"/upload/{frame:04d}.png"},
-         "annotations": [{"result": [result(box) for box in BOXES.get(frame, [])]}]}
-        for frame in range(3)
-    ]  # fmt: skip
-    return source(dump(folder / "studio.json", tasks))
-
-
-def via(folder: Path) -> Source:
-    def region(box: tuple[float, ...]) -> dict[str, Any]:
-        shape = {"name": "rect", "x": box[0], "y": box[1], "width": box[2], "height": box[3]}
-        return {"shape_attributes": shape, "region_attributes": {"kind": "person"}}
-
-    images = {
-        f"f{frame}.jpg1": {"filename": f"f{frame}.jpg", "size": 1, "regions": [region(b) for b in BOXES.get(frame, [])]}
-        for frame in range(3)
-    }
-    return source(dump(folder / "via.json", {"_via_img_metadata": images}), classes=("person",))
-
-
-def csv_mapped(folder: Path) -> Source:
-    rows = [
-        f"{frame},{b[0] + b[2] / 2},{b[1] + b[3] / 2},{b[2]},{b[3]},{b[4]}" for frame in BOXES for b in BOXES[frame]
-    ]
-    (folder / "own.csv").write_text("\n".join(["Bild,mx,my,w,h,p", *rows]))
-    return source(folder / "own.csv", columns=(("frame", "Bild"), ("x", "mx"), ("y", "my"), ("score", "p")))
-
-
-def csv_corners(folder: Path) -> Source:
-    rows = [f"{frame},{','.join(map(str, corners(b)))},{b[4]},person" for frame in BOXES for b in BOXES[frame]]
-    (folder / "own.csv").write_text("\n".join(["frame_id,xmin,ymin,xmax,ymax,confidence,label", *rows]))
-    return source(folder / "own.csv", classes=("person",))
-
-
-def parquet(folder: Path) -> Source:
-    pyarrow = pytest.importorskip("pyarrow")
-    from pyarrow import parquet as writer
-
-    rows = [(frame, *b) for frame in BOXES for b in BOXES[frame]]
-    names = ("frame", "left", "top", "width", "height", "score")
-    writer.write_table(
-        pyarrow.table(dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))), folder / "b.parquet"
-    )
-    return source(folder / "b.parquet")
-
-
-SCORED: dict[str, Writer] = {
-    "Ultralytics text": yolo_text,
-    "Ultralytics JSON": yolo_json,
-    "COCO results": coco_results,
-    "COCO data set": coco_dataset,
-    "MMDetection": mmdetection,
-    "CSV": csv_mapped,
-    "CSV with corners": csv_corners,
-    "Parquet": parquet,
+SAMPLES = Path(__file__).parent / "detections"
+"""A folder a format, with the boxes as its program writes them."""
+FORMATS: dict[str, tuple[str, dict[str, Any]]] = {
+    "Ultralytics text": ("labels", {"first_frame": 1, "classes": ("person",)}),
+    "Ultralytics JSON": ("r.jsonl", {}),
+    "COCO results": ("results.json", {"select": "cam1/*", "classes": ("Person",)}),
+    "COCO data set": ("data.json", {"select": "cam1/*"}),
+    "MMDetection": ("preds", {"classes": ("0",)}),
+    "CSV": ("own.csv", {"columns": (("frame", "Bild"), ("x", "mx"), ("y", "my"), ("score", "p"))}),
+    "CSV with corners": ("own.csv", {"classes": ("person",)}),
+    "Parquet": ("b.parquet", {}),
+    "WILDTRACK": ("annotations_positions", {"view": 1}),
+    "MOTChallenge truth": ("gt.txt", {"first_frame": 1}),
+    "CVAT XML": ("video.xml", {"classes": ("person",)}),
+    "Label Studio": ("studio.json", {}),
+    "VIA": ("via.json", {"classes": ("person",)}),
 }
-ANNOTATED: dict[str, Writer] = {
-    "WILDTRACK": wildtrack,
-    "MOTChallenge truth": motchallenge_truth,
-    "CVAT XML": cvat,
-    "Label Studio": label_studio,
-    "VIA": via,
-}
+"""The file or folder of each, and the keys of its source."""
+ANNOTATED = ("WILDTRACK", "MOTChallenge truth", "CVAT XML", "Label Studio", "VIA")
+"""Formats without scores."""
 
 
-@pytest.mark.parametrize("name", [*SCORED, *ANNOTATED])
+def sample(folder: Path, name: str) -> Source:
+    """A copy of a format's files, and their source."""
+    if name == "Parquet":
+        pytest.importorskip("pyarrow")
+    shutil.copytree(SAMPLES / name.lower().replace(" ", "_"), folder, dirs_exist_ok=True)
+    (file, keys), images = FORMATS[name], folder / "images.json"
+    return Source("boxes", folder / file, **keys, image_list=images if images.exists() else None)
+
+
+@pytest.mark.parametrize("name", FORMATS)
 def test_every_format_gives_the_same_boxes(tmp_path: Path, name: str) -> None:
-    found = read_source((SCORED | ANNOTATED)[name](tmp_path), SIZE)
+    found = read_source(sample(tmp_path, name), SIZE)
     assert name.startswith(found.format)
     assert found.frames == 3
     for frame in range(3):
         boxes, own = found.table.at(frame), BOXES.get(frame, [])
         np.testing.assert_allclose(boxes.pixel.reshape(-1, 4), np.array([b[:4] for b in own]).reshape(-1, 4), atol=1e-6)
-        scores = [b[4] if name in SCORED else 1.0 for b in own]
+        scores = [1.0 if name in ANNOTATED else b[4] for b in own]
         np.testing.assert_allclose(boxes.score, scores)
 
 
@@ -249,7 +109,7 @@ def test_every_format_gives_the_same_boxes(tmp_path: Path, name: str) -> None:
     ],
 )  # fmt: skip
 def test_a_malformed_twin_is_one_line(tmp_path: Path, name: str, file: str, old: str, new: str, message: str) -> None:
-    made = (SCORED | ANNOTATED)[name](tmp_path)
+    made = sample(tmp_path, name)
     path = tmp_path / file
     text = path.read_text()
     assert old in text
@@ -277,21 +137,22 @@ def test_a_malformed_table_of_parquet_is_one_line(
     chosen = {name: values if name == column else own for name, own in columns.items()}
     table = {name: own for name, own in chosen.items() if own is not None}
     writer.write_table(pyarrow.table(table), tmp_path / "b.parquet")
-    assert "\n" not in refused(InputError, message, read_source, source(tmp_path / "b.parquet"), SIZE)
+    assert "\n" not in refused(InputError, message, read_source, Source("boxes", tmp_path / "b.parquet"), SIZE)
 
 
 def test_broken_parquet_and_unknown_json_are_named(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     (tmp_path / "b.parquet").write_bytes(b"no")
-    refused(FormatError, "no Parquet", read_source, source(tmp_path / "b.parquet"), SIZE)
+    refused(FormatError, "no Parquet", read_source, Source("boxes", tmp_path / "b.parquet"), SIZE)
+    (tmp_path / "x.json").write_text('{"a": 1}')
     with pytest.raises(FormatError, match="of no known detections, expected one of Ultralytics text, WILDTRACK"):
-        read_source(source(dump(tmp_path / "x.json", {"a": 1})), SIZE)
+        read_source(Source("boxes", tmp_path / "x.json"), SIZE)
     (tmp_path / "y.json").write_text("{\n no json")
-    refused(FormatError, r"y.json: line 2: found no JSON", read_source, source(tmp_path / "y.json"), SIZE)
+    refused(FormatError, r"y.json: line 2: found no JSON", read_source, Source("boxes", tmp_path / "y.json"), SIZE)
 
 
 def test_classes_and_scores_choose(tmp_path: Path) -> None:
-    made = yolo_text(tmp_path)
+    made = sample(tmp_path, "Ultralytics text")
     both = read_source(Source("boxes", made.path, 1), SIZE)
     assert both.read.classes() == {"person": 3, "car": 2}
     assert len(read_source(Source("boxes", made.path, 1, classes=("car",)), SIZE).kept) == 2
@@ -310,9 +171,9 @@ def test_ground_truth_of_motchallenge_keeps_its_flag_and_classes(tmp_path: Path)
 
 def test_track_ids_are_no_scores_and_keypoints_no_outlines(tmp_path: Path) -> None:
     (tmp_path / "v_0.txt").write_text("0 0.5 0.5 0.1 0.2 1\n0 0.2 0.5 0.1 0.2 2\n")
-    assert read_source(source(tmp_path), SIZE).kept.score.tolist() == [1, 1]
+    assert read_source(Source("boxes", tmp_path), SIZE).kept.score.tolist() == [1, 1]
     (tmp_path / "v_0.txt").write_text(f"0 0.5 0.5 0.1 0.2 {'0.3 0.4 0.9 ' * 17} 0.75\n")
-    found = read_source(source(tmp_path), SIZE)
+    found = read_source(Source("boxes", tmp_path), SIZE)
     assert found.kept.score.tolist() == [0.75] and not found.kept.mask
 
 
@@ -327,12 +188,12 @@ def test_run_lengths_are_cocos() -> None:
 
 
 def test_masks_become_instances(tmp_path: Path, camera: Any) -> None:
-    rows = coco_rows()
+    rows = json.loads((SAMPLES / "coco_results" / "results.json").read_text())
     rows[0]["segmentation"] = [[10, 12, 30, 12, 30, 42, 10, 42]]
     rows[1]["segmentation"] = {"size": [60, 80], "counts": [0, 60, 4740]}
     rows[2]["segmentation"] = [[0, 0, 3, 0, 3, 59, 0, 59]]
-    path = dump(tmp_path / "r.json", rows)
-    stream = open_stream(Source("instances", path, 7), camera)
+    (tmp_path / "r.json").write_text(json.dumps(rows))
+    stream = open_stream(Source("instances", tmp_path / "r.json", 7), camera)
     first, empty, third, end = (stream.read() for _ in range(4))
     assert isinstance(first, np.ndarray) and first.dtype == np.uint16 and first[20, 20] == 1 and first[50, 50] == 0
     assert isinstance(empty, np.ndarray) and not empty.any()
@@ -379,7 +240,7 @@ def test_inspect_says_what_a_rig_delivers_and_draws_it(
     from stseg.commands.inspect import inspect
 
     monkeypatch.setenv("COLUMNS", "200")
-    yolo_text(tmp_path)
+    sample(tmp_path, "Ultralytics text")
     rig = tmp_path / "rig.toml"
     rig.write_text(RIG.replace("PATH", "labels"))
     inspect(rig, output=tmp_path / "pictures")
