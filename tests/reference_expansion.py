@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.graphcut.expansion import LabelEnergy
-from stseg.records.predicted_places import PredictedPlaces
+from stseg.records.predicted_tracks import PredictedPlaces
 from stseg.segmentation.label_energy import BodyShape
 
 

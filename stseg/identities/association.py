@@ -17,9 +17,8 @@ from stseg.identities.evidence.size_model import MeasuredSizes, SizeModel, learn
 from stseg.identities.search.beam_search import SearchLimits, search_identities
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
-from stseg.records.rows_of_tracks import rows_of_tracks
 from stseg.records.tables import KNOWN_PERSON
-from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
+from stseg.tracking.row_groups import isolated_tracklets, rows_of_tracks
 
 _DRAFT_DIVISOR = 4
 """Divisor of the number of hypotheses in the draft search; appearance is learned from its identities."""

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Flags, Floats, Ints
 from stseg.config import BodyConfig
 from stseg.records.sizes import Sizes, log_heavy_tailed
 
@@ -82,3 +82,19 @@ def no_tracks() -> PredictedTracks:
     """No track."""
     none = np.zeros(0)
     return PredictedTracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), Sizes(none, none, none, none), none)
+
+
+@dataclass(frozen=True)
+class PredictedPlaces:
+    """Predicted places of tracks in the frames of a window."""
+
+    track: Ints
+    """int64 (k,): track numbers, 1 or more, rising."""
+    expected: Flags
+    """bool (time, k): whether the track has a prediction in the frame."""
+    ground: Floats
+    """float64 (time, k, 2): metres."""
+    covariance: Floats
+    """float64 (time, k, 2, 2): square metres."""
+    height: Floats
+    """float64 (time, k): of their heads, metres."""

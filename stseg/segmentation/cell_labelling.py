@@ -20,7 +20,7 @@ from stseg.graphcut.expansion import expand
 from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.solvers import Solver
 from stseg.records.blobs import UNASSIGNED
-from stseg.records.predicted_places import PredictedPlaces
+from stseg.records.predicted_tracks import PredictedPlaces
 from stseg.segmentation.label_energy import BodyShape, label_energy, track_shares
 
 

@@ -24,7 +24,7 @@ from stseg.graphcut.cell_subset import CellSubset
 from stseg.graphcut.expansion import LabelEnergy
 from stseg.graphcut.grid_energy import QUANTUM
 from stseg.kernels.accelerate import kernel
-from stseg.records.predicted_places import PredictedPlaces
+from stseg.records.predicted_tracks import PredictedPlaces
 
 GATE = 13.8
 """Squared Mahalanobis distance that one place in a thousand exceeds (chi square, two degrees of freedom)."""
@@ -59,7 +59,9 @@ def track_shares(
     disc = body.reach**2 / 4
     spread = predicted.covariance + disc * np.eye(2)
     log_volume = 0.5 * np.log(np.linalg.det(spread)) - math.log(disc)
-    weight = np.zeros((len(frame), len(predicted.track) + 1)) if appearance is None else _with_unassigned(appearance)
+    weight = np.zeros((len(frame), len(predicted.track) + 1))
+    if appearance is not None:
+        weight[:, :-1] = appearance
     precision: Floats = np.asarray(np.linalg.inv(spread), float)
     _fill_log_weights(
         frame, ground, height, predicted.expected, predicted.ground, precision, log_volume, predicted.height,
@@ -81,10 +83,6 @@ def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> L
     first = np.append(0, np.cumsum(np.bincount(cell, minlength=len(unary))))
     cost = penalty - unary[cell] + subgraph.border[cell]
     return LabelEnergy(first, column + 1, cost, subgraph.start, subgraph.end, subgraph.weight)
-
-
-def _with_unassigned(appearance: Floats) -> Floats:
-    return np.column_stack([appearance, np.zeros(len(appearance))])
 
 
 @kernel

@@ -17,8 +17,8 @@ from stseg.arrays import Ints, Rows
 from stseg.config import Config
 from stseg.identities.association import IdentityProblem, associate_globally
 from stseg.records.border import Border
-from stseg.records.rows_of_tracks import rows_of_tracks
 from stseg.records.tables import APPEARANCE, CORRECTION, TRAJECTORY
+from stseg.tracking.row_groups import rows_of_tracks
 from stseg.tracking.segment_stitching import matches
 from stseg.trajectories.final_tracks import bridged_rows
 

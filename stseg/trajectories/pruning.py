@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Flags, Ints, Rows
 from stseg.config import TrackingConfig
 from stseg.records.tables import EVENT
-from stseg.tracking.windows.near_rows import near_rows
+from stseg.tracking.row_groups import near_rows
 
 
 def drop_short(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Rows, Rows]:

@@ -12,11 +12,11 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig, TrackingConfig
-from stseg.records.rows_of_tracks import rows_of_tracks
 from stseg.records.tables import TRAJECTORY
 from stseg.tracking.filter.assignment import distances
 from stseg.tracking.filter.motion_model import process_noise, transition
 from stseg.tracking.filter.track_filter import EXCLUSION_RADIUS
+from stseg.tracking.row_groups import rows_of_tracks
 
 _DRIFT_PER_FRAME = 0.1
 """Growth of a place's standard deviation a frame away from the nearest detection, metres."""

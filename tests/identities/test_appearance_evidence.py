@@ -11,7 +11,7 @@ from stseg.identities.association import IdentityProblem, associate_globally
 from stseg.identities.evidence.appearance_model import LearnedAppearance, learn_appearance, row_looks
 from stseg.identities.evidence.size_model import MeasuredSizes
 from stseg.records.tables import APPEARANCE, COLOURS, FEATURES
-from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
+from stseg.tracking.row_groups import isolated_tracklets
 
 PEOPLE = 6
 FRAMES = range(160)

@@ -12,7 +12,7 @@ from stseg.arrays import Ints, Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally
 from stseg.identities.evidence.size_model import MeasuredSizes
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
-from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
+from stseg.tracking.row_groups import isolated_tracklets
 
 
 def relinked(rows: Rows) -> GlobalAssociation:

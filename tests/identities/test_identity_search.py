@@ -30,7 +30,7 @@ from stseg.identities.search.extension import Alternatives
 from stseg.identities.search.hypotheses import Hypotheses, Pasts
 from stseg.io.runfile.runs import read_run
 from stseg.records.tables import APPEARANCE
-from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
+from stseg.tracking.row_groups import isolated_tracklets
 
 MODEL = SizeModel(np.array([1.7]), np.array([0.03**2]), np.array([0.5]), np.array([0.1**2]), np.full(1, np.inf))
 LONGEST = 1.0

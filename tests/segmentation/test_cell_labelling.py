@@ -19,7 +19,7 @@ from stseg.graphcut.expansion import LabelEnergy, expand
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.solvers import SOLVERS
 from stseg.records.blobs import UNASSIGNED
-from stseg.records.predicted_places import PredictedPlaces
+from stseg.records.predicted_tracks import PredictedPlaces
 from stseg.segmentation.cell_labelling import WindowDetections, WindowLabels, label_cells
 from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.cut_energy import build_energy, neighbourhood

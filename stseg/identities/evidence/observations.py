@@ -11,7 +11,7 @@ from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.config import Config
 from stseg.identities.evidence.size_model import SizeModel
 from stseg.records.border import Border
-from stseg.tracking.windows.near_rows import near_rows
+from stseg.tracking.row_groups import near_rows
 
 _EXCHANGE_DISTANCE = 0.8
 """Distance below which the filter may have exchanged two tracks, metres."""

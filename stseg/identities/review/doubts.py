@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Rows
-from stseg.records.rows_of_tracks import rows_of_tracks
+from stseg.tracking.row_groups import rows_of_tracks
 
 _ENCOUNTER_DISTANCE = 0.7
 """Distance of an encounter, metres."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.config import MotionConfig, TrackingConfig
-from stseg.records.predicted_places import PredictedPlaces
+from stseg.records.predicted_tracks import PredictedPlaces
 from stseg.tracking.windows.tracklets import Tracklet
 
 _DRIFT_SPEED = 0.5

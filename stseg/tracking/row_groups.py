@@ -1,11 +1,13 @@
-"""Isolated tracklets: parts of tracks between encounters and gaps, which belong to one person for certain."""
+"""Rows of a whole run in groups, found at once: rows of each track, pairs of near people, and isolated tracklets.
+
+Isolated tracklets are parts of tracks between encounters and gaps, which belong to one person for certain.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Ints, Rows
-from stseg.tracking.windows.near_rows import near_rows
+from stseg.arrays import Floats, Ints, Rows
 
 _ENCOUNTER_DISTANCE = 0.6
 """Distance of an encounter, metres."""
@@ -40,3 +42,32 @@ def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
     nearest = np.lexsort((frame, away, encounter))
     nearest = nearest[np.diff(encounter[nearest], prepend=0) > 0]
     return track[nearest].reshape(-1), np.repeat(frame[nearest], 2)
+
+
+def near_rows(trajectory: Rows, distance: float) -> tuple[Ints, Floats]:
+    """Pairs of rows of one frame less than a distance apart, metres; the trajectory, TRAJECTORY (n,), is in any order.
+
+    Returns the rows of each pair, int64 (k, 2), that of the lower id first, and their distances, float64 (k,), in no
+    order.
+    """
+    order = np.lexsort((trajectory["id"], trajectory["frame"]))
+    frame, x, y = (trajectory[name][order] for name in ("frame", "x", "y"))
+    pairs, distances = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
+    for step in range(1, len(order)):
+        same = frame[step:] == frame[:-step]
+        if not same.any():
+            break
+        away = np.hypot(x[step:] - x[:-step], y[step:] - y[:-step])
+        pair = np.flatnonzero(same & (away < distance))
+        pairs.append(np.column_stack([order[pair], order[pair + step]]))
+        distances.append(away[pair])
+    return np.concatenate(pairs), np.concatenate(distances)
+
+
+def rows_of_tracks(ids: Ints) -> list[Ints]:
+    """Rows of each track (`ids` int64 (n,) of all rows), by rising id; each in the order of the rows.
+
+    A day has thousands of tracks, too many to search all rows for each.
+    """
+    order = np.argsort(ids, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(ids[order])) + 1) if len(order) else []
