@@ -85,23 +85,23 @@ class IdentityProblem:
         first[order] = order[search_identities(self.observations, self.model, self.motion, self.limits, bound).name]
         return first
 
-    def visits(self, identity: Ints, frame: Ints, known: Rows = NO_KNOWN_PEOPLE) -> Visits:
+    def visits(self, identity: Ints, frame: Ints, earlier: Rows = NO_KNOWN_PEOPLE) -> Visits:
         """Sums of sizes and appearance over the visit of each identity, after those of people of earlier recordings.
 
-        `identity` and `frame` int64 (n,) are those of each row, identity 0 for none; `known` KNOWN_PERSON (k,) are the
-        people of earlier recordings.
+        `identity` and `frame` int64 (n,) are those of each row, identity 0 for none; `earlier` KNOWN_PERSON (k,) are
+        the people of earlier recordings.
         """
         order = self.observations.order
         precision, information = self.observations.precision, self.observations.information
         visits = pooled_visits(identity[order], frame[order], precision, information)
-        value = np.full((len(known), len(self.model.spread)), np.nan)
+        value = np.full((len(earlier), len(self.model.spread)), np.nan)
         number = np.zeros(value.shape)
-        value[:, 0], number[:, 0] = known["height"], known["height_count"]
-        if self.colours is not None and len(known):
-            axes = self.colours.of(known["colours"])
-            value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, known["appearance_count"][:, None]
+        value[:, 0], number[:, 0] = earlier["height"], earlier["height_count"]
+        if self.colours is not None and len(earlier):
+            axes = self.colours.of(earlier["colours"])
+            value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, earlier["appearance_count"][:, None]
         precision, information = self.model.evidence(value, self.frame_rate)
-        return visits.after(known["id"], number * precision, number * information)
+        return visits.after(earlier["id"], number * precision, number * information)
 
     def score(self, constraints: Constraints, since: float, until: float) -> float:
         """Score of the best identities of the rows from `since` until `until`, seconds: nats.

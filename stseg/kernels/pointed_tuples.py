@@ -31,7 +31,7 @@ def pointed(fields: Fields) -> Fields:
 
 
 class Pointed(types.Type):
-    """The type of a named tuple, whose own type is `fields`, by its address."""
+    """The type of a named tuple by its address; `fields` is the type of the tuple."""
 
     def __init__(self, fields: Any) -> None:
         self.fields = fields

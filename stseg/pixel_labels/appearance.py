@@ -135,8 +135,8 @@ def colour_log_ratios(
     """Log-ratio of a pixel's colour for a person to that for the mean of all who may cover it.
 
     float32 (m,), nats, at the pixels of each person's rectangle; 0 where no other person may be. `appearance` holds the
-    colours of the view's tracks, `likelihood` the prior shares of the frame's people, whose ids are `track` int64 (n,);
-    `image` uint8 (v, u, 3) holds the colours of the window.
+    colours of the view's tracks, `likelihood` the prior shares of the frame's people, `rows` and `track` int64 (n,)
+    their rows and ids, and `image` uint8 (v, u, 3) the colours of the window.
     """
     place = np.searchsorted(appearance.track, track)
     density, ratio = np.zeros((2, len(likelihood.people.share)), np.float32)

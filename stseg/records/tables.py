@@ -161,7 +161,7 @@ KNOWN_PERSON = np.dtype(
         ("appearance_count", "<i8"),
     ]
 )
-"""One row per person of earlier recordings, with whom the people of this one are compared."""
+"""One row per person of earlier recordings; the people of this one are compared with them."""
 
 
 @dataclass(frozen=True)
