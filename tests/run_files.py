@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Labels, Rows, Singles
+from stseg.arrays import Ints, Labels, Rows, Singles
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.layout import LOG_ODDS_STEP, ghost_type
@@ -48,6 +48,15 @@ def small_trajectory() -> Rows:
     return table
 
 
+def trajectory_of(*rows: tuple[int, int, float, float]) -> Rows:
+    """Rows of frame, id, x, y of people 1.7 m tall."""
+    table = np.zeros(len(rows), TRAJECTORY)
+    for name, column in zip(("frame", "id", "x", "y"), zip(*rows, strict=True), strict=False):
+        table[name] = column
+    table["height"] = 1.7
+    return table
+
+
 def small_ghosts() -> Rows:
     """Three candidates, one of them a ghost, of which the right view says nothing."""
     table = np.zeros(3, ghost_type(2))
@@ -72,9 +81,23 @@ def fill(writer: RunWriter) -> None:
     writer.append("ghosts", small_ghosts())
 
 
-def write_small_run(path: Path, overwrite: bool = False) -> Path:
-    """A whole run file."""
-    recording = small_recording(path.parent)
+def write_run(
+    path: Path, recording: Recording, trajectory: Rows, frames: Ints = FRAMES, config: str = CONFIG, **tables: Rows
+) -> Path:
+    """A run file of these tables, without evidence of any cell."""
+    shape = recording.rig.grid.shape
+    with RunWriter(path, recording, np.ones(shape, np.uint8), config, overwrite=True) as writer:
+        volume = np.zeros((len(frames), *shape), np.float32)
+        writer.append_frames(frames, volume, volume.astype(np.int32))
+        for name, table in {"trajectory": trajectory, **tables}.items():
+            writer.append(name, table)
+        writer.finish(Tracks(trajectory).summary())
+    return path
+
+
+def write_small_run(path: Path, overwrite: bool = False, recording: Recording | None = None) -> Path:
+    """A whole run file, of the small recording or another one of its size."""
+    recording = recording or small_recording(path.parent)
     views = np.full(recording.rig.grid.shape, 2, np.uint8)
     with RunWriter(path, recording, views, CONFIG, overwrite=overwrite) as writer:
         fill(writer)

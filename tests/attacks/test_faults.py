@@ -17,10 +17,7 @@ import pytest
 from fault_driver import Driver
 from recordings import assert_same, compiled_only, write_recording
 
-pytestmark = [
-    pytest.mark.skipif(sys.platform != "linux", reason="needs /proc"),
-    compiled_only,
-]
+pytestmark = [pytest.mark.skipif(sys.platform != "linux", reason="needs /proc"), compiled_only]
 
 
 @pytest.fixture(scope="module")

@@ -80,14 +80,7 @@ class TestVerdict:
         assert words.startswith("the views agree: none is off by more than a cell (10 cm)")
 
     @pytest.mark.parametrize(
-        ("view", "kind", "amount"),
-        [
-            (0, "x", 0.4),
-            (1, "y", -0.4),
-            (2, "u", 30.0),
-            (1, "z", 0.25),
-            (0, "yaw", 14.0),
-        ],
+        ("view", "kind", "amount"), [(0, "x", 0.4), (1, "y", -0.4), (2, "u", 30.0), (1, "z", 0.25), (0, "yaw", 14.0)]
     )
     def test_the_camera_that_is_off_is_named(self, view: int, kind: str, amount: float) -> None:
         check, words = judged(moved(RIG, view, kind, amount))

@@ -12,13 +12,7 @@ from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import cameras_of
 from stseg.calibration.automatic.auto import align_all, merge_views, placed_views
 from stseg.calibration.automatic.floor_features import Marks, floor_marks
-from stseg.calibration.automatic.solution import (
-    SolvedViews,
-    refine,
-    refine_with_marks,
-    single_view_cameras,
-    view_paths,
-)
+from stseg.calibration.automatic.solution import SolvedViews, refine, refine_with_marks, single_view_cameras, view_paths
 from stseg.calibration.pinhole import CENTRE
 from stseg.geometry import Camera, Grid
 from stseg.simulation import SceneSpec

@@ -77,6 +77,12 @@ def test_version_and_help_of_a_command(stdout: Command) -> None:
     assert "MOTChallenge" in stdout("export", "--help")  # the long text, not the line of the list
 
 
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_knows_commands_and_options(shell: str, stdout: Command) -> None:
+    text = stdout("completion", shell)
+    assert "calibrate" in text and "measure" in text and "camera-images" in text
+
+
 @pytest.mark.skipif(os.name == "nt", reason="needs a shell's pipe")
 def test_a_reader_that_has_seen_enough_is_no_error(run_path: Path) -> None:
     command = [sys.executable, "-c", COMMAND, "inspect", "--json", str(run_path)]

@@ -38,26 +38,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs th
 from stseg.commands.main import main
 sys.exit(main())
 """
-OPTIONS = tuple(
-    word
-    for constant in (
-        *(
-            "segments.length=1.5",
-            "segments.warm_up=0.5",
-            "segments.background_period=2",
-            "segments.background_samples=4",
-            "tracking.context=0",
-        ),
-        *(
-            "detection.lattice_spacing=0.25",
-            "live.file_quiet_time=0.3",
-            "live.background_time=1",
-            "live.reconnect_wait=0.1",
-            "live.stream_timeout=1",
-        ),
-    )
-    for word in ("--set", constant)
+CONSTANTS = (
+    "segments.length=1.5 segments.warm_up=0.5 segments.background_period=2 segments.background_samples=4 "
+    "tracking.context=0 detection.lattice_spacing=0.25 live.file_quiet_time=0.3 live.background_time=1 "
+    "live.reconnect_wait=0.1 live.stream_timeout=1"
 )
+OPTIONS = tuple(word for constant in CONSTANTS.split() for word in ("--set", constant))
 """Segments of twelve frames; backgrounds that hold for sixteen; tracks that are final with their window."""
 
 
@@ -68,9 +54,7 @@ def track(rig: Path, output: Path, *more: str) -> int:
 
 def process(rig: Path, output: Path, *more: str) -> subprocess.Popen[str]:
     arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), "--follow", *OPTIONS, *more]
-    return subprocess.Popen(
-        arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )  # fmt: skip
+    return subprocess.Popen(arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 def lines(output: Path) -> list[str]:
@@ -333,12 +317,8 @@ def test_a_real_rtsp_server_whose_streams_end_is_followed(
     reported, messages = running.communicate(timeout=60)
     assert running.returncode == 0, messages
     assert "tracks in frames 0 to" in reported
-    assert (
-        3
-        <= messages.count("the stream is back")
-        <= messages.count("no pictures from")
-        <= messages.count("the stream is back") + 3
-    )
+    back, lost = messages.count("the stream is back"), messages.count("no pictures from")
+    assert 3 <= back <= lost <= back + 3
     run = read_run(tmp_path / "run.h5")
     assert run.frames.tolist() == list(range(run.frames[-1] + 1))
     assert len(run.tracks) >= 3

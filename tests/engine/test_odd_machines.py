@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import pytest
 from attacks import write_rig
-from recordings import ALONE, ENVIRONMENT, OPTIONS, assert_same, compiled_only, track, write_recording
+from recordings import ALONE, ENVIRONMENT, OPTIONS, assert_same, compiled_only, process, track, write_recording
 from run_files import write_small_run
 
 from stseg.commands.main import main
@@ -47,10 +47,7 @@ for arguments in json.loads(sys.argv[1]):
 
 def lines_of(program: str, *arguments: object, **environment: str) -> tuple[int, list[str]]:
     """Exit status of a command in a process of its own, and its lines on standard error."""
-    done = subprocess.run(
-        [sys.executable, "-c", program, *map(str, arguments)],
-        env=ENVIRONMENT | environment, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = process(program, *arguments, **environment)
     return done.returncode, done.stderr.splitlines()
 
 

@@ -40,9 +40,7 @@ def night(tmp_path: Path) -> Path:
 
 def process(rig: Path, output: Path) -> subprocess.Popen[str]:
     arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), *OPTIONS, *ALONE]
-    return subprocess.Popen(
-        arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )  # fmt: skip
+    return subprocess.Popen(arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 def segments_of(output: Path) -> list[Path]:

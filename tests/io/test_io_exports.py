@@ -11,7 +11,7 @@ import warnings
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from zipfile import ZipFile
 
 import geopandas
@@ -25,10 +25,11 @@ import shapely.geometry
 import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Command
-from run_files import CONFIG, FRAMES, small_recording, small_trajectory, write_small_run
+from refusals import Command, refused
+from run_files import FRAMES, small_recording, small_trajectory, write_run, write_small_run
 
 from stseg.arrays import Rows
+from stseg.commands.export import export
 from stseg.commands.main import main
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
@@ -38,8 +39,8 @@ from stseg.io.exports.formats import FORMATS
 from stseg.io.exports.geographic import BEGINNING
 from stseg.io.exports.movement import headings
 from stseg.io.extras import load_extra
-from stseg.io.runfile.runs import Run, RunWriter, read_run
-from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.io.runfile.runs import Run, read_run
+from stseg.records.tables import TRAJECTORY
 
 with warnings.catch_warnings():  # it tells on import of what it could do with more libraries
     warnings.simplefilter("ignore")
@@ -55,12 +56,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 def run_of(path: Path, trajectory: Rows) -> Run:
     """A run of six frames with these rows and nothing else."""
-    with RunWriter(path, small_recording(path.parent), np.ones((3, 4, 6), np.uint8), CONFIG, overwrite=True) as writer:
-        volume = np.zeros((len(FRAMES), 3, 4, 6), np.float32)
-        writer.append_frames(FRAMES, volume, volume.astype(np.int32))
-        writer.append("trajectory", trajectory)
-        writer.finish(Tracks(trajectory).summary())
-    return read_run(path)
+    return read_run(write_run(path, small_recording(path.parent), trajectory))
 
 
 @pytest.fixture(scope="module")
@@ -389,3 +385,31 @@ def test_one_place_is_a_point_and_no_number_is_null(tmp_path: Path) -> None:
     (moving,) = json.loads((tmp_path / "mf-json").read_text("utf-8"))["features"]
     assert moving["temporalProperties"][0]["score"]["values"] == [None]
     assert moving["properties"] == {"id": 7, "height": None, "score": None}
+
+
+# Databases of many runs
+
+
+QUESTION = (
+    "SELECT r.recording, COUNT(*), MAX(t.x) FROM recordings r JOIN trajectory t USING (recording) GROUP BY 1 ORDER BY 1"
+)
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> list[Path]:
+    return [write_small_run(tmp_path / f"{name}.h5") for name in ("monday", "tuesday")]
+
+
+@pytest.mark.parametrize("to", ["sqlite", "duckdb"])
+def test_a_database_holds_all_runs(runs: list[Path], path: Path, to: Literal["sqlite", "duckdb"]) -> None:
+    library = pytest.importorskip({"sqlite": "sqlite3"}.get(to, to))
+    export(*runs, to=to, output=path)
+    with closing(library.connect(str(path))) as connection:
+        assert connection.execute(QUESTION).fetchall() == [("monday", 9, 0.3), ("tuesday", 9, 0.3)]
+        assert connection.execute("SELECT COUNT(*), SUM(frames) FROM tracks").fetchone() == (4, 18)
+        assert connection.execute("SELECT DISTINCT kind FROM events").fetchall() == [("birth",)]
+
+
+def test_many_runs_need_a_database_and_names_of_their_own(runs: list[Path], path: Path) -> None:
+    refused(ConfigError, "2 run files, expected one, or --to sqlite or duckdb", export, *runs, to="csv", output=path)
+    refused(ConfigError, "monday twice", export, runs[0], runs[0], to="sqlite", output=path)

@@ -8,19 +8,17 @@ import cv2
 import numpy as np
 import pytest
 from refusals import Command, refused
+from run_files import write_run
 from scenes import box_frame_sets, looking, mask_frame_sets, rig_of, standing_at, walkers
 
-from stseg.arrays import Boxes, Bytes, Rows
+from stseg.arrays import Boxes, Bytes
 from stseg.commands.main import main
 from stseg.config import LabelConfig
 from stseg.errors import OutputError
 from stseg.geometry import Rig
 from stseg.io.outputs.label_images import LabelImages
-from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.streams import open_images
-from stseg.io.runfile.runs import RunWriter
-from stseg.records.tables import Tracks
 
 PALETTE = np.random.default_rng(0).integers(0, 256, (256, 3)).astype(np.uint8)
 FRAMES = 4
@@ -30,19 +28,13 @@ def two_cameras() -> Rig:
     return rig_of([looking("west", (-3.5, -3.5, 2.6)), looking("east", (3.5, -3.4, 2.6))])
 
 
-def write_run(path: Path, sources: tuple[CameraSource, ...], tracks: Rows, config: str = "") -> Path:
+def run_of(path: Path, sources: tuple[CameraSource, ...], config: str = "") -> Path:
     recording = Recording(path.with_name("rig.toml"), two_cameras(), sources)
-    views = np.full(recording.rig.grid.shape, 2, np.uint8)
-    with RunWriter(path, recording, views, config, overwrite=False) as writer:
-        volume = np.zeros((FRAMES, *views.shape), np.float32)
-        writer.append_frames(np.arange(FRAMES), volume, volume.astype(np.int32))
-        writer.append("trajectory", tracks)
-        writer.finish(Tracks(tracks).summary())
-    return path
+    return write_run(path, recording, walkers(FRAMES), np.arange(FRAMES), config)
 
 
-def mask_sources(folder: Path, frame_sets: list[FrameSet], instances: bool = False) -> tuple[CameraSource, ...]:
-    sources = []
+def mask_sources(folder: Path, frames: int = FRAMES, instances: bool = False) -> tuple[CameraSource, ...]:
+    sources, frame_sets = [], list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, frames))
     for k, camera in enumerate(two_cameras().cameras):
         own = folder / f"{camera.name}_seen"
         own.mkdir()
@@ -65,8 +57,7 @@ def read(folder: Path, camera: str) -> list[Bytes]:
 
 @pytest.fixture
 def run_path(tmp_path: Path) -> Path:
-    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
-    return write_run(tmp_path / "run.h5", mask_sources(tmp_path, frame_sets), walkers(FRAMES))
+    return run_of(tmp_path / "run.h5", mask_sources(tmp_path))
 
 
 # Files
@@ -129,10 +120,9 @@ def test_frames_keep_their_numbers_and_their_labels(run_path: Path, tmp_path: Pa
 
 
 def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> None:
-    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
     folder = tmp_path / "instances"
     folder.mkdir()
-    path = write_run(folder / "run.h5", mask_sources(folder, frame_sets, instances=True), walkers(FRAMES))
+    path = run_of(folder / "run.h5", mask_sources(folder, instances=True))
     for source, out in ((run_path, "masks_out"), (path, "instances_out")):
         assert main(["labels", str(source), "-o", str(tmp_path / out)]) == 0
     for ours, theirs in zip(
@@ -142,10 +132,9 @@ def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> N
 
 
 def test_boxes_have_no_label_images_and_blind_views_no_labels(tmp_path: Path) -> None:
-    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
-    masks, _ = mask_sources(tmp_path, frame_sets[:2])
+    masks, _ = mask_sources(tmp_path, 2)
     masks = CameraSource(masks.source, on_missing="blind")
-    path = write_run(tmp_path / "run.h5", (masks, box_source(tmp_path / "east.csv")), walkers(FRAMES))
+    path = run_of(tmp_path / "run.h5", (masks, box_source(tmp_path / "east.csv")))
     assert main(["labels", str(path), "-o", str(tmp_path / "out")]) == 0
     assert [folder.name for folder in (tmp_path / "out").iterdir()] == ["west"]
     images = read(tmp_path / "out", "west")
@@ -165,7 +154,7 @@ def box_source(path: Path) -> CameraSource:
 def test_what_the_user_can_mend_is_said(tmp_path: Path, refusal: Command, run_path: Path) -> None:
     boxes = tmp_path / "boxes"
     boxes.mkdir()
-    path = write_run(boxes / "run.h5", (box_source(boxes / "east.csv"),) * 2, walkers(FRAMES))
+    path = run_of(boxes / "run.h5", (box_source(boxes / "east.csv"),) * 2)
     said = "found boxes alone, expected a camera that delivers pixels"
     assert said in refusal("labels", path, "-o", tmp_path / "out")
     assert "--frames" in refusal("labels", run_path, "-o", tmp_path / "out", "--frames", "3:9")
@@ -174,10 +163,9 @@ def test_what_the_user_can_mend_is_said(tmp_path: Path, refusal: Command, run_pa
 
 
 def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
-    frame_sets = list(mask_frame_sets(two_cameras(), walkers(FRAMES), 0, FRAMES))
-    sources = mask_sources(tmp_path, frame_sets)
-    wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nposition_noise = 0.5\n")
-    plain = write_run(tmp_path / "plain.h5", sources, walkers(FRAMES))
+    sources = mask_sources(tmp_path)
+    wide = run_of(tmp_path / "wide.h5", sources, "[labels]\nposition_noise = 0.5\n")
+    plain = run_of(tmp_path / "plain.h5", sources)
     narrow = ("--set", f"labels.position_noise={LabelConfig().position_noise}")
     for path, options in ((wide, ()), (wide, narrow), (plain, ())):
         out = str(tmp_path / f"{path.stem}{len(options)}")

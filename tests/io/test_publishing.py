@@ -37,6 +37,12 @@ EXPECTED = [
 ]
 
 
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A receiver that failed is tried again at once."""
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+
+
 def parsed(bodies: list[bytes]) -> list[object]:
     return [json.loads(line) for body in bodies for line in body.splitlines()]
 
@@ -83,11 +89,8 @@ def test_rows_arrive_by_http(posted: tuple[str, list[bytes], list[int]]) -> None
     assert parsed(bodies) == EXPECTED
 
 
-def test_a_receiver_that_fails_for_a_while_gets_everything(
-    posted: tuple[str, list[bytes], list[int]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_receiver_that_fails_for_a_while_gets_everything(posted: tuple[str, list[bytes], list[int]]) -> None:
     address, bodies, answers = posted
-    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
     answers += [503, 503]
     said: list[str] = []
     with Publisher(receiver_of(address), 5.0, said.append) as publisher:
@@ -98,8 +101,7 @@ def test_a_receiver_that_fails_for_a_while_gets_everything(
     assert [line.split(" (")[0] for line in said] == ["publishing waits for its receiver", "publishing goes on"]
 
 
-def test_an_answer_that_is_no_http_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+def test_an_answer_that_is_no_http_is_one_line() -> None:
     said: list[str] = []
     with socket.create_server(("127.0.0.1", 0)) as server:
 
@@ -119,7 +121,6 @@ def test_an_answer_that_is_no_http_is_one_line(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
     monkeypatch.setattr("stseg.io.live.publishing._WAITING", 10)
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
@@ -133,21 +134,12 @@ def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     assert said[-1].startswith("30 messages were not published")
 
 
-@pytest.mark.parametrize(
-    "address",
-    [
-        "file:///etc/passwd",
-        "mqtt://host",
-        "mqtt:///topic",
-        "http://",
-        "x",
-        "http://[",
-        "http://a:b/",
-        "ftp://a/b",
-        "ws:///path",
-        "ws://a/b#c",
-    ],
+BAD_ADDRESSES = (
+    "file:///etc/passwd mqtt://host mqtt:///topic http:// x http://[ http://a:b/ ftp://a/b ws:///path ws://a/b#c"
 )
+
+
+@pytest.mark.parametrize("address", BAD_ADDRESSES.split())
 def test_other_addresses_are_refused(address: str) -> None:
     refused(ConfigError, r"expected mqtt://HOST\[:PORT\]/TOPIC", receiver_of, address)
 
@@ -216,8 +208,7 @@ def test_a_web_socket_that_breaks_is_opened_again() -> None:
     assert messages == ["first", "second"]
 
 
-def test_a_web_socket_that_comes_late_is_one_line_and_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+def test_a_web_socket_that_comes_late_is_one_line_and_another() -> None:
     said: list[str] = []
     bodies: list[bytes] = []
     with socket.socket() as unused:
@@ -233,11 +224,8 @@ def test_a_web_socket_that_comes_late_is_one_line_and_another(monkeypatch: pytes
     assert said[1:] == ["publishing goes on"] and parsed(bodies) == EXPECTED
 
 
-def test_a_web_server_that_is_none_of_sockets_is_one_line(
-    posted: tuple[str, list[bytes], list[int]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_web_server_that_is_none_of_sockets_is_one_line(posted: tuple[str, list[bytes], list[int]]) -> None:
     pytest.importorskip("websockets.sync.client")
-    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
     said: list[str] = []
     with Publisher(receiver_of(posted[0].replace("http", "ws")), 5.0, said.append) as publisher:
         publisher.append(rows_of(7))

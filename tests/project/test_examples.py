@@ -10,11 +10,11 @@ import numpy as np
 import pandas
 import pedpy
 import pytest
-from run_files import CONFIG, small_recording
+from run_files import small_recording, write_run
 
 from stseg.geometry import Grid
-from stseg.io.runfile.runs import Run, RunWriter, read_run
-from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.io.runfile.runs import Run, read_run
+from stseg.records.tables import TRAJECTORY
 from stseg.simulation import NAMED
 from stseg.simulation.crowd.social_forces import walk_freely
 
@@ -33,13 +33,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         trajectory[name] = truth[name]
     recording = small_recording(folder)
     rig = replace(recording.rig, frame_rate=spec.frame_rate, grid=Grid((-3, 3), (-3, 3), 1.0, 1.8, 1))
-    views = np.ones(rig.grid.shape, np.uint8)
-    with RunWriter(folder / "run.h5", replace(recording, rig=rig), views, CONFIG, overwrite=False) as writer:
-        volume = np.zeros((spec.frames, *rig.grid.shape), np.float32)
-        writer.append_frames(np.arange(spec.frames), volume, volume.astype(np.int32))
-        writer.append("trajectory", trajectory)
-        writer.finish(Tracks(trajectory).summary())
-    return read_run(folder / "run.h5")
+    path, frames = folder / "run.h5", np.arange(spec.frames)
+    return read_run(write_run(path, replace(recording, rig=rig), trajectory, frames))
 
 
 def walked(*places: tuple[float, float]) -> pandas.DataFrame:

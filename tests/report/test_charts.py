@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from run_files import trajectory_of
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
@@ -24,15 +25,6 @@ from stseg.reporting.run_statistics import (
     people_by_hour,
     people_per_minute,
 )
-
-
-def trajectory_of(*rows: tuple[int, int, float, float]) -> Rows:
-    """Rows of frame, id, x, y."""
-    table = np.zeros(len(rows), TRAJECTORY)
-    for name, column in zip(("frame", "id", "x", "y"), zip(*rows, strict=True), strict=False):
-        table[name] = column
-    table["height"] = 1.7
-    return table
 
 
 def steps(svg: str, name: str) -> list[tuple[float, float]]:
@@ -155,35 +147,27 @@ RIG = Rig("hall", 2.0, GRID, ())
 BINS = Bins((0.0, 4.0), (-1.0, 2.0), 1.0)
 
 
-def rows_of(*rows: tuple[int, int, float, float]) -> Rows:
-    """Rows of frame, id, x, y."""
-    table = np.zeros(len(rows), TRAJECTORY)
-    for name, column in zip(("frame", "id", "x", "y"), zip(*rows, strict=True), strict=False):
-        table[name] = column
-    return table
-
-
 def test_density_is_people_a_square_metre() -> None:
-    found = density(BINS, rows_of((0, 1, 0.5, -0.5), (1, 1, 0.6, -0.4), (1, 2, 3.9, 1.9), (1, 3, 9, 9)), 2)
+    found = density(BINS, trajectory_of((0, 1, 0.5, -0.5), (1, 1, 0.6, -0.4), (1, 2, 3.9, 1.9), (1, 3, 9, 9)), 2)
     assert found.shape == (3, 4)
     assert (found[0, 0], found[2, 3], found.sum()) == (1, 0.5, 1.5)
-    assert density(Bins(BINS.x, BINS.y, 0.5), rows_of((0, 1, 0.2, -0.9)), 1)[0, 0] == 4
+    assert density(Bins(BINS.x, BINS.y, 0.5), trajectory_of((0, 1, 0.2, -0.9)), 1)[0, 0] == 4
 
 
 def test_a_return_begins_another_stay() -> None:
     home, away = (0.5, -0.5), (2.5, -0.5)
     walk = [home, home, home, home, away, home, home, away]
-    found = dwell(BINS, rows_of(*((frame, 1, *place) for frame, place in enumerate(walk))), 2.0)
+    found = dwell(BINS, trajectory_of(*((frame, 1, *place) for frame, place in enumerate(walk))), 2.0)
     assert (found[0, 0], found[0, 2]) == (6 / 2 / 2.0, 2 / 2 / 2.0)  # frames a stay at two frames a second
-    two = rows_of((0, 1, *home), (1, 1, *home), (0, 2, *home), (1, 2, *home))
+    two = trajectory_of((0, 1, *home), (1, 1, *home), (0, 2, *home), (1, 2, *home))
     assert dwell(BINS, two, 2.0)[0, 0] == 1
-    assert not dwell(BINS, rows_of(), 2.0).any()
+    assert not dwell(BINS, trajectory_of(), 2.0).any()
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.tuples(st.floats(-1, 5), st.floats(-2, 3)), max_size=50))
 def test_every_row_on_the_ground_is_counted_once(places: list[tuple[float, float]]) -> None:
-    rows = rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(places)))
+    rows = trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(places)))
     inside = (rows["x"] >= 0) & (rows["x"] < 4) & (rows["y"] >= -1) & (rows["y"] < 2)
     assert BINS.count(BINS.index(rows)).sum() == inside.sum()
 
@@ -201,7 +185,7 @@ def test_haunts_are_where_most_time_is_spent() -> None:
     passing = rng.uniform((0, -1), (4, 2), (20, 2))
     places = np.concatenate([waiting, talking, passing])
     found = dwell_places(
-        rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(places.tolist()))), Bins(BINS.x, BINS.y, 0.25)
+        trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(places.tolist()))), Bins(BINS.x, BINS.y, 0.25)
     )
     assert len(found) == 2
     np.testing.assert_allclose([(place.x, place.y) for place in found], [(1, 0), (3, 1)], atol=0.15)
@@ -210,7 +194,7 @@ def test_haunts_are_where_most_time_is_spent() -> None:
 
 def test_nobody_dwells_where_all_walk_alike() -> None:
     even = np.stack(np.meshgrid(np.arange(0.05, 20, 0.25), np.arange(0.05, 20, 0.25)), -1).reshape(-1, 2)
-    rows = rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(even.tolist())))
+    rows = trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(even.tolist())))
     assert dwell_places(rows, Bins((0.0, 20.0), (0.0, 20.0), 0.5)) == []
     assert dwell_places(rows[:0], BINS) == []
 

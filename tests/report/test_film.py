@@ -17,8 +17,7 @@ from stseg.errors import OutputError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.outputs.video_writer import write_film
 from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.runfile.runs import RunWriter
-from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.records.tables import TRAJECTORY
 from stseg.reporting.figures import RunFilm
 from stseg.reporting.pictures.colours import track_colour
 from stseg.reporting.pictures.overlay import OverlayView
@@ -54,12 +53,7 @@ def walk() -> Rows:
 
 @pytest.fixture
 def run_path(recording: Recording, tmp_path: Path) -> Path:
-    path, shape = tmp_path / "run.h5", (6, *recording.rig.grid.shape)
-    with RunWriter(path, recording, np.full(shape[1:], 2, np.uint8), "", overwrite=False) as writer:
-        writer.append_frames(run_files.FRAMES, np.zeros(shape, np.float32), np.zeros(shape, np.int32))
-        writer.append("trajectory", walk())
-        writer.finish(Tracks(walk()).summary())
-    return path
+    return run_files.write_run(tmp_path / "run.h5", recording, walk())
 
 
 def frames_of(path: Path) -> list[Bytes]:
@@ -126,11 +120,7 @@ def test_without_the_flag_a_film_holds_no_camera_pixel(run_path: Path, tmp_path:
     ],
 )
 def test_slips_are_told_before_any_work(
-    run_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    refusal: Command,
-    arguments: list[str],
-    message: str,
+    run_path: Path, monkeypatch: pytest.MonkeyPatch, refusal: Command, arguments: list[str], message: str
 ) -> None:
     monkeypatch.chdir(run_path.parent)
     before = set(run_path.parent.iterdir())

@@ -13,8 +13,7 @@ from browser import CHROMIUM, Page, chromium
 
 from stseg.commands.report import report
 from stseg.io.areas import read_lines, read_polygons
-from stseg.io.runfile.runs import RunWriter
-from stseg.records.tables import TRACK
+from stseg.records.tables import TRAJECTORY
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
 
@@ -109,9 +108,8 @@ def test_play_goes_on_to_the_end_and_stops(page: Page) -> None:
 
 
 def test_a_run_without_frames_has_a_page_that_does_not_complain(tmp_path: Path) -> None:
-    recording, path = run_files.small_recording(tmp_path), tmp_path / "empty.h5"
-    with RunWriter(path, recording, np.ones((3, 4, 6), np.uint8), run_files.CONFIG, overwrite=False) as writer:
-        writer.finish(np.zeros(0, TRACK))
+    recording, no_frames = run_files.small_recording(tmp_path), np.zeros(0, np.int64)
+    path = run_files.write_run(tmp_path / "empty.h5", recording, np.zeros(0, TRAJECTORY), no_frames)
     report(path, output=tmp_path / "empty.html")
     with chromium(tmp_path / "profile") as browser:
         browser.open(tmp_path / "empty.html")

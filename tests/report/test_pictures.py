@@ -12,10 +12,10 @@ import run_files
 import strategies
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from run_files import trajectory_of
 
 from stseg.arrays import AnyArray, Boxes, Bytes, Rows
 from stseg.geometry import Camera, Grid, Rig
-from stseg.records.tables import TRAJECTORY
 from stseg.reporting.figures import backdrop
 from stseg.reporting.pictures.canvas import place_labels
 from stseg.reporting.pictures.colours import NIGHT, PAPER, track_colour
@@ -25,15 +25,6 @@ from stseg.reporting.pictures.slices import colours_of, marginal_picture, volume
 from stseg.reporting.pictures.spacetime import Block, spacetime_picture
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
-
-
-def trajectory_of(*rows: tuple[int, int, float, float]) -> Rows:
-    """Rows of frame, id, x, y."""
-    table = np.zeros(len(rows), TRAJECTORY)
-    for name, column in zip(("frame", "id", "x", "y"), zip(*rows, strict=True), strict=False):
-        table[name] = column
-    table["height"] = 1.7
-    return table
 
 
 def front_camera(size: tuple[int, int] = (320, 240)) -> Camera:

@@ -23,7 +23,7 @@ from stseg.io.recording.recording import CameraSource, Source
 from stseg.io.runfile.layout import ghost_type
 from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.records.ghost_reasons import DENIED, OTHERS, TOO_LITTLE, ghost_reasons
-from stseg.records.tables import EVENT, RATES, TRACK, TRAJECTORY, Tracks
+from stseg.records.tables import EVENT, RATES, TRAJECTORY, Tracks
 from stseg.tasks.report import write_pictures
 from stseg.view_health.run_warnings import body_warnings, view_warnings
 
@@ -41,14 +41,9 @@ def decoded(png: bytes) -> Bytes:
     return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), np.uint8)
 
 
-@pytest.fixture
-def run_file(tmp_path: Path) -> Path:
-    return run_files.write_small_run(tmp_path / "small.h5")
-
-
-def test_the_page_holds_everything_and_loads_nothing(run_file: Path, tmp_path: Path) -> None:
+def test_the_page_holds_everything_and_loads_nothing(run_path: Path, tmp_path: Path) -> None:
     output = tmp_path / "page.html"
-    report(run_file, output=output)
+    report(run_path, output=output)
     page = output.read_text()
     words = re.sub(r"data:image/png;base64,[^\"]+", "", page)
     assert not re.search(r"https?:|<link|url\(|src=\"[^\"]|<script[^>]* src|fetch\(|import\(|XMLHttpRequest", words)
@@ -72,10 +67,10 @@ def test_an_encounter_is_one_line_and_says_how_long_it_was(tmp_path: Path) -> No
     assert "which this run did not keep (--volume tracks)" in page
 
 
-def test_the_same_run_gives_the_same_page(run_file: Path, tmp_path: Path) -> None:
+def test_the_same_run_gives_the_same_page(run_path: Path, tmp_path: Path) -> None:
     pages = [tmp_path / "a.html", tmp_path / "b.html"]
     for page in pages:
-        report(run_file, output=page, frame=(12,))
+        report(run_path, output=page, frame=(12,))
     assert pages[0].read_bytes() == pages[1].read_bytes()
 
 
@@ -87,9 +82,7 @@ def test_names_from_the_run_cannot_write_html(tmp_path: Path) -> None:
     cameras = tuple(replace(camera, name=f"{HOSTILE}{k}") for k, camera in enumerate(recording.rig.cameras))
     evil = replace(recording, rig=replace(recording.rig, name=HOSTILE, cameras=cameras))
     path, names = tmp_path / "evil.h5", tmp_path / "names.csv"
-    with RunWriter(path, evil, np.ones(evil.rig.grid.shape, np.uint8), run_files.CONFIG, overwrite=False) as writer:
-        run_files.fill(writer)
-        writer.finish(Tracks(run_files.small_trajectory()).summary())
+    run_files.write_small_run(path, recording=evil)
     names.write_text("id,name\n1,</script><script>alert(1)</script>\n2,</td><img src=x onerror=alert(1)>\n")
     report(path, output=tmp_path / "evil.html", names=names)
     page = (tmp_path / "evil.html").read_text()
@@ -99,9 +92,8 @@ def test_names_from_the_run_cannot_write_html(tmp_path: Path) -> None:
 
 
 def test_a_run_without_frames_has_a_page(tmp_path: Path) -> None:
-    recording, path = run_files.small_recording(tmp_path), tmp_path / "empty.h5"
-    with RunWriter(path, recording, np.ones(recording.rig.grid.shape, np.uint8), "", overwrite=False) as writer:
-        writer.finish(np.zeros(0, TRACK))
+    recording, no_frames = run_files.small_recording(tmp_path), np.zeros(0, np.int64)
+    path = run_files.write_run(tmp_path / "empty.h5", recording, np.zeros(0, TRAJECTORY), no_frames)
     report(path, output=tmp_path / "empty.html")
     assert "<title>hall</title>" in (tmp_path / "empty.html").read_text()
 
@@ -125,14 +117,9 @@ def filmed_run(tmp_path: Path) -> Path:
     folder.mkdir()
     for frame in range(16):
         cv2.imwrite(str(folder / f"{frame:03d}.png"), np.full((12, 16, 3), VIVID, np.uint8))
-    recording = run_files.small_recording(tmp_path)
     sources = (CameraSource(Source("images", folder)),) * 2
-    recording = replace(recording, sources=sources)
-    path = tmp_path / "filmed.h5"
-    with RunWriter(path, recording, np.ones(recording.rig.grid.shape, np.uint8), "", overwrite=False) as writer:
-        run_files.fill(writer)
-        writer.finish(Tracks(run_files.small_trajectory()).summary())
-    return path
+    recording = replace(run_files.small_recording(tmp_path), sources=sources)
+    return run_files.write_small_run(tmp_path / "filmed.h5", recording=recording)
 
 
 def test_camera_pixels_are_shown_only_when_asked_for(filmed_run: Path, tmp_path: Path) -> None:
@@ -148,51 +135,51 @@ def test_camera_pixels_are_shown_only_when_asked_for(filmed_run: Path, tmp_path:
     assert found == [[False, False], [True, True]]
 
 
-def test_without_the_flag_no_stream_is_even_opened(run_file: Path, tmp_path: Path) -> None:
-    (tmp_path / "left.avi").unlink()
-    report(run_file, output=tmp_path / "a.html", frame=(11,))
+def test_without_the_flag_no_stream_is_even_opened(run_path: Path, tmp_path: Path) -> None:
+    run_path.with_name("left.avi").unlink()
+    report(run_path, output=tmp_path / "a.html", frame=(11,))
     with pytest.raises(SourceError):
-        report(run_file, output=tmp_path / "b.html", camera_images=True)
+        report(run_path, output=tmp_path / "b.html", camera_images=True)
     assert not (tmp_path / "b.html").exists()
 
 
 def test_pictures_are_written_beside_the_page(
-    run_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report(run_file, output=tmp_path / "a.html", pictures=tmp_path / "one", frame=(11,))
+    report(run_path, output=tmp_path / "a.html", pictures=tmp_path / "one", frame=(11,))
     maps = {"plan", "spacetime", "density", "dwell", "flow", "ghosts", "blind"}
     plain = maps | {"slices", "marginal", "overlay_left", "overlay_right"}
     assert {path.stem for path in (tmp_path / "one").iterdir()} == plain
     assert "a.html" in capsys.readouterr().out
-    report(run_file, output=tmp_path / "b.html", pictures=tmp_path / "two", frame=(10, 13))
+    report(run_path, output=tmp_path / "b.html", pictures=tmp_path / "two", frame=(10, 13))
     names = {path.stem for path in (tmp_path / "two").iterdir()}
     assert {"plan", "slices_10", "slices_13", "overlay_left_13"} <= names and "slices" not in names
 
 
-def test_truth_adds_scores_of_the_run_s_frames(run_file: Path, tmp_path: Path) -> None:
+def test_truth_adds_scores_of_the_run_s_frames(run_path: Path, tmp_path: Path) -> None:
     rows = [f"{row['frame']},{row['id']},{row['x']},{row['y']}" for row in run_files.small_trajectory()]
     truth = tmp_path / "truth.csv"
     truth.write_text("\n".join(["frame,id,x,y", "3,1,0.1,0.1", *rows, "900,1,0.1,0.1"]))
-    report(run_file, output=tmp_path / "a.html", truth=truth, frame=(11,))
+    report(run_path, output=tmp_path / "a.html", truth=truth, frame=(11,))
     assert "<dt>IDF1</dt><dd>100.0 %</dd>" in (tmp_path / "a.html").read_text()
 
 
-def test_write_pictures_replaces_older_ones(run_file: Path, tmp_path: Path) -> None:
-    run = read_run(run_file)
+def test_write_pictures_replaces_older_ones(run_path: Path, tmp_path: Path) -> None:
+    run = read_run(run_path)
     first = write_pictures(tmp_path / "out", run.recording, run, None, 12)
     assert first == write_pictures(tmp_path / "out", run.recording, run, run.trajectory, 12)
     assert [path.name for path in first[:3]] == ["plan.png", "spacetime.png", "slices.png"]
     assert all(cv2.imread(str(path)) is not None for path in first)
 
 
-def test_errors_of_the_user_are_reported(run_file: Path, tmp_path: Path) -> None:
-    refused(ConfigError, r"--frame.*found 99.*10 to 15", report, run_file, output=tmp_path / "a.html", frame=(99,))
+def test_errors_of_the_user_are_reported(run_path: Path, tmp_path: Path) -> None:
+    refused(ConfigError, r"--frame.*found 99.*10 to 15", report, run_path, output=tmp_path / "a.html", frame=(99,))
     (tmp_path / "old.html").write_text("old")
-    refused(OutputError, "overwrite", report, run_file, output=tmp_path / "old.html")
-    report(run_file, output=tmp_path / "old.html", overwrite=True, frame=(11,))
+    refused(OutputError, "overwrite", report, run_path, output=tmp_path / "old.html")
+    report(run_path, output=tmp_path / "old.html", overwrite=True, frame=(11,))
     assert (tmp_path / "old.html").read_text() != "old"
     with pytest.raises(OutputError):
-        report(run_file, output=tmp_path / "a.html", pictures=run_file, frame=(11,))
+        report(run_path, output=tmp_path / "a.html", pictures=run_path, frame=(11,))
 
 
 # Warnings

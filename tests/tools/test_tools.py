@@ -23,10 +23,14 @@ DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
 with_data = pytest.mark.skipif(not DATA.exists(), reason="the data sets are not here")
 
 
-@pytest.fixture
-def datasets(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """tools/datasets.py, which is no part of the package."""
+@pytest.fixture(autouse=True)
+def tools(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder of tools, which is no part of the package, is on the path."""
     monkeypatch.syspath_prepend(ROOT / "tools")
+
+
+@pytest.fixture
+def datasets() -> ModuleType:
     return importlib.import_module("datasets")
 
 
@@ -76,15 +80,7 @@ def test_wildtrack_has_boxes_in_every_view(datasets: ModuleType, tmp_path: Path)
 # Results
 
 
-@pytest.fixture
-def tools(monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of tools, which is no part of the package, on the path."""
-    monkeypatch.syspath_prepend(ROOT / "tools")
-    return ROOT / "tools"
-
-
-def test_the_page_shows_trackers_side_by_side(tools: Path) -> None:
-    del tools
+def test_the_page_shows_trackers_side_by_side() -> None:
     results = importlib.import_module("results")
     row = {"frames": "0:136", "MODA": "99.6", "IDF1": "98.04", "error_m": "0.03", "switches": "0"}
     text = "above\n<!-- table -->\nold\n<!-- end of table -->\nbelow\n"
@@ -94,15 +90,13 @@ def test_the_page_shows_trackers_side_by_side(tools: Path) -> None:
     assert shown.startswith("above\n") and shown.endswith("below\n")
 
 
-def test_the_committed_page_shows_the_stored_rows(tools: Path) -> None:
-    del tools
+def test_the_committed_page_shows_the_stored_rows() -> None:
     results = importlib.import_module("results")
     text = results.PAGE.read_text(encoding="utf-8")
     assert results.page(text, results.stored()) == text
 
 
-def test_a_perturbed_rig_is_shifted_as_stated(tools: Path) -> None:
-    del tools
+def test_a_perturbed_rig_is_shifted_as_stated() -> None:
     measure = importlib.import_module("measure")
     rig = rig_of([looking("west", (-3.5, -3.5, 2.6)), looking("east", (3.5, -3.4, 2.6))])
     for seed in range(20):
@@ -115,7 +109,7 @@ def test_a_perturbed_rig_is_shifted_as_stated(tools: Path) -> None:
             assert np.hypot(*(pixels[1] - pixels[0])[0]) == pytest.approx(1.0)
 
 
-def test_sets_are_commands_that_exist(tools: Path) -> None:
+def test_sets_are_commands_that_exist() -> None:
     sets = importlib.import_module("result_sets").SETS
     variants = importlib.import_module("result_variants").VARIANTS
     assert [variant.name for variant in sets["easy"].variants] == list(variants)
@@ -126,19 +120,17 @@ def test_sets_are_commands_that_exist(tools: Path) -> None:
         for command in [*film, *one.prepare, run, score]:
             program, what, *rest = shlex.split(command)
             assert program in ("stseg", "python"), name
-            assert program == "stseg" or (tools.parent / what).is_file()
+            assert program == "stseg" or (ROOT / what).is_file()
             assert all("{" not in word or "{name}" in word for word in rest)
 
 
 @pytest.mark.parametrize("option", [["--sets", "uu4,uu5"], ["--sets", "none", "--variants", "cut,uu5"]])
-def test_an_unknown_name_is_refused(tools: Path, option: list[str]) -> None:
-    del tools
+def test_an_unknown_name_is_refused(option: list[str]) -> None:
     with pytest.raises(SystemExit, match="uu5: expected names among"):
         importlib.import_module("results").main(option)
 
 
-def test_pom_camera_is_fitted_to_its_rectangles(tools: Path) -> None:
-    del tools
+def test_pom_camera_is_fitted_to_its_rectangles() -> None:
     pom_rig = importlib.import_module("pom_rig")
     homography = [[60.0, 35.0, 40.0], [4.0, -9.0, 110.0], [0.02, 0.12, 1.0]]
     camera = Camera("c", (160, 120), np.array(homography), np.array([0.5, -40.0, 0.01]))
@@ -152,9 +144,8 @@ def test_pom_camera_is_fitted_to_its_rectangles(tools: Path) -> None:
     np.testing.assert_allclose(vertical * scale, camera.vertical, atol=1e-8)
 
 
-@pytest.mark.skipif(not DATA.exists(), reason="the data sets are not here")
-def test_pom_rig_sees_bodies_where_the_recording_says(tools: Path, tmp_path: Path) -> None:
-    del tools
+@with_data
+def test_pom_rig_sees_bodies_where_the_recording_says(tmp_path: Path) -> None:
     pom_rig = importlib.import_module("pom_rig")
     pom_rig.main(DATA / "pom", tmp_path / "pom.toml")
     for index, camera in enumerate(read_recording(tmp_path / "pom.toml").rig.cameras):
