@@ -47,7 +47,7 @@ for arguments in json.loads(sys.argv[1]):
 
 def lines_of(program: str, *arguments: object, **environment: str) -> tuple[int, list[str]]:
     """Exit status of a command in a process of its own, and its lines on standard error."""
-    done = process(program, *arguments, **environment)
+    done = process(program, *arguments, cwd=None, **environment)
     return done.returncode, done.stderr.splitlines()
 
 
