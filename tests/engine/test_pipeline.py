@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, repeat
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -91,17 +92,11 @@ def whole(kind: str, tracker: str) -> Run:
 
 def assert_equal(one: Run, other: Run) -> None:
     """Everything but the time it took, bit for bit."""
-    np.testing.assert_array_equal(one.label, other.label)
-    np.testing.assert_array_equal(one.trajectory, other.trajectory)
-    np.testing.assert_array_equal(one.tracks.trajectory, other.tracks.trajectory)
-    np.testing.assert_array_equal(one.tracks.boxes, other.tracks.boxes)
-    np.testing.assert_array_equal(one.tracks.events, other.tracks.events)
-    np.testing.assert_array_equal(one.identity, other.identity)
+    for name in ("label", "trajectory", "tracks.trajectory", "tracks.boxes", "tracks.events", "identity"):
+        np.testing.assert_array_equal(attrgetter(name)(one), attrgetter(name)(other), name)
     for a, b in zip(one.steps, other.steps, strict=True):
-        np.testing.assert_array_equal(a.candidates, b.candidates)
-        np.testing.assert_array_equal(a.parts, b.parts)
-        np.testing.assert_array_equal(a.commit.events, b.commit.events)
-        np.testing.assert_array_equal(a.commit.windows, b.commit.windows)
+        for name in ("candidates", "parts", "commit.events", "commit.windows"):
+            np.testing.assert_array_equal(attrgetter(name)(a), attrgetter(name)(b), name)
         for x, y in zip(a.commit.frames, b.commit.frames, strict=True):
             np.testing.assert_array_equal(x.log_odds, y.log_odds)
 

@@ -289,12 +289,8 @@ class TestCommand:
 
     def test_options_may_stand_apart_from_their_values(self, calibrations: list[str]) -> None:
         apart = [word for option in (*SCENE, *SOURCE) for word in option.split("=")]
-        app(
-            ["import", "opencv", *calibrations, *apart, "-o", "room.toml"],
-            exit_on_error=False,
-            print_error=False,
-            result_action="return_value",
-        )
+        tokens = ["import", "opencv", *calibrations, *apart, "-o", "room.toml"]
+        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         assert read_recording("room.toml").rig.grid.x == (-1.0, 1.0)
 
     def test_pairs_names_sources_polygon(self, calibrations: list[str]) -> None:

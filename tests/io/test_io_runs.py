@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -43,11 +44,6 @@ if TYPE_CHECKING:
     from _typeshed import TraceFunction
 
 VIEWS: Bytes = np.full((3, 4, 6), 2, np.uint8)
-
-
-@pytest.fixture
-def run_path(tmp_path: Path) -> Path:
-    return write_small_run(tmp_path / "night.h5")
 
 
 def writer_at(path: Path, overwrite: bool = False) -> RunWriter:
@@ -199,9 +195,6 @@ def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
         refused(ValueError, "rows", writer.append, "ghosts", np.zeros(1, layout.ghost_type(3)))
     with pytest.raises(ValueError, match="views"):
         RunWriter(tmp_path / "slip.h5", small_recording(tmp_path), VIEWS[:2], CONFIG, overwrite=False)
-
-
-# Other ids
 
 
 # Whole or not at all
@@ -422,50 +415,38 @@ def test_a_cut_off_file_is_told(run_path: Path) -> None:
     refused(FormatError, "whole run file", read_run, run_path)
 
 
-def delete(name: str) -> Callable[[h5py.File], object]:
-    return lambda file: file.__delitem__(name)
-
-
-def replace(name: str, values: object) -> Callable[[h5py.File], object]:
-    def edit(file: h5py.File) -> None:
-        del file[name]
-        file[name] = values
-
-    return edit
-
-
-def group_instead(name: str) -> Callable[[h5py.File], object]:
-    def edit(file: h5py.File) -> None:
-        del file[name]
-        file.create_group(name)
-
-    return edit
-
-
 @pytest.mark.parametrize(
-    ("edit", "named"),
+    ("place", "value", "named"),
     [
-        (lambda file: file.attrs.__setitem__("format_version", 1), "/@format_version: found 1, expected 2"),
-        (lambda file: file.attrs.__setitem__("format", "geff"), "/@format: found 'geff'"),
-        (lambda file: file.attrs.__delitem__("cameras"), "/@cameras: found nothing"),
-        (lambda file: file["trajectory"].attrs.__delitem__("fps"), "/trajectory@fps: found nothing"),
-        (delete("events"), "/events: found nothing"),
-        (delete("entry/occupancy/label"), "/entry/occupancy/label: found nothing"),
-        (delete("provenance"), "/provenance/config: found nothing"),
-        (delete("entry/title"), "/entry/title: found nothing"),
-        (replace("windows", np.zeros((2, 2))), "/windows: found the type float64"),
-        (replace("tracks", np.zeros((2, 2), TRAJECTORY)), "/tracks: found the type"),
-        (replace("entry/occupancy/views", np.zeros((3, 4, 5), "u1")), "/entry/occupancy/views: found the shape"),
-        (replace("entry/occupancy/log_odds", np.zeros((6, 3), "f4")), "/entry/occupancy/log_odds: found 2 dim"),
-        (group_instead("boxes"), "/boxes: found no array"),
+        ("/@format_version", 1, "/@format_version: found 1, expected 2"),
+        ("/@format", "geff", "/@format: found 'geff'"),
+        ("/@cameras", None, "/@cameras: found nothing"),
+        ("/trajectory@fps", None, "/trajectory@fps: found nothing"),
+        ("/events", None, "/events: found nothing"),
+        ("/entry/occupancy/label", None, "/entry/occupancy/label: found nothing"),
+        ("/provenance", None, "/provenance/config: found nothing"),
+        ("/entry/title", None, "/entry/title: found nothing"),
+        ("/windows", np.zeros((2, 2)), "/windows: found the type float64"),
+        ("/tracks", np.zeros((2, 2), TRAJECTORY), "/tracks: found the type"),
+        ("/entry/occupancy/views", np.zeros((3, 4, 5), "u1"), "/entry/occupancy/views: found the shape"),
+        ("/entry/occupancy/log_odds", np.zeros((6, 3), "f4"), "/entry/occupancy/log_odds: found 2 dim"),
     ],
 )
-def test_what_is_missing_or_wrong_is_named(run_path: Path, edit: Callable[[h5py.File], object], named: str) -> None:
+def test_what_is_missing_or_wrong_is_named(run_path: Path, place: str, value: object, named: str) -> None:
+    name, _, attribute = place.partition("@")
     with h5py.File(run_path, "r+") as file:
-        edit(file)
-    with pytest.raises(FormatError) as caught:
-        read_run(run_path)
-    assert f"{run_path}: {named}" in str(caught.value)
+        values, key = (file[name].attrs, attribute) if attribute else (file, name)
+        del values[key]
+        if value is not None:
+            values[key] = value
+    refused(FormatError, re.escape(f"{run_path}: {named}"), read_run, run_path)
+
+
+def test_a_group_is_no_table(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        del file["boxes"]
+        file.create_group("boxes")
+    refused(FormatError, "/boxes: found no array", read_run, run_path)
 
 
 def test_a_run_without_rates_has_an_overview(run_path: Path) -> None:
