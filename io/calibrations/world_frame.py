@@ -100,7 +100,7 @@ def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False)
     return min(UNITS, key=lambda unit: abs(np.log(height * UNITS[unit] / _USUAL_HEIGHT)))
 
 
-def require_height(cameras: Sequence[ForeignCamera], world: World) -> None:
+def require_median_height(cameras: Sequence[ForeignCamera], world: World) -> None:
     """Refuse a unit with implausible camera heights where another gives plausible ones; raises CalibrationError."""
     height = median_height(cameras, world)
     if height <= 0 or _HEIGHTS[0] <= height <= _HEIGHTS[1]:

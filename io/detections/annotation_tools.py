@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.errors import FormatError
 from stseg.io.detections.masks import Polygons, flat_polygons
-from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, number, require
+from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, number, required_value
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_xml
 
@@ -77,15 +77,15 @@ def read_label_studio(request: Request, data: Any) -> Detections:
 
 
 def _label_studio_results(path: Path, index: int, task: Any) -> Iterator[Any]:
-    for annotation in require(path, f"task {index}", task, "annotations"):
-        yield from require(path, f"task {index}", annotation, "result")
+    for annotation in required_value(path, f"task {index}", task, "annotations"):
+        yield from required_value(path, f"task {index}", annotation, "result")
 
 
 def _add_result(request: Request, found: DetectionList, place: str, frame: int, one: Any) -> None:
     value, (width, height) = one.get("value", {}), request.size
     if one.get("type") == "rectanglelabels":
         x, y, wide, tall = (
-            number(request.path, place, key, require(request.path, place, value, key)) / 100 for key in _PERCENT
+            number(request.path, place, key, required_value(request.path, place, value, key)) / 100 for key in _PERCENT
         )
         label = str(next(iter(value.get("rectanglelabels", [])), ""))
         found.add(place, frame, (x * width, y * height, wide * width, tall * height), label=label)
@@ -100,10 +100,11 @@ _PERCENT = ("x", "y", "width", "height")
 
 def _add_video_track(request: Request, found: DetectionList, place: str, value: Any) -> None:
     """One video rectangle: frames count from 1 there; between two keyframes it is enabled in, it moves straight."""
-    steps = require(request.path, place, value, "sequence")
+    steps = required_value(request.path, place, value, "sequence")
     label, size = str(next(iter(value.get("labels", [])), "")), np.array(request.size * 2)
+    keys = ("frame", *_PERCENT)
     table = np.array(
-        [[number(request.path, place, key, require(request.path, place, step, key)) for key in ("frame", *_PERCENT)]
+        [[number(request.path, place, key, required_value(request.path, place, step, key)) for key in keys]
          for step in steps]
     ).reshape(-1, 5)  # fmt: skip
     if (np.diff(table[:, 0]) <= 0).any() or table[-1:, 0].sum() - table[:1, 0].sum() > limits.INTERPOLATED - len(found):
@@ -137,13 +138,13 @@ def read_via(request: Request, data: Any) -> Detections:
         regions = image["regions"]
         for index, region in enumerate(regions.values() if isinstance(regions, dict) else regions):
             place = f"{image['filename']}, region {index}"
-            shape = require(request.path, place, region, "shape_attributes")
+            shape = required_value(request.path, place, region, "shape_attributes")
             label = str(next((v for v in region.get("region_attributes", {}).values() if isinstance(v, str)), ""))
             if shape.get("name") == "rect":
-                box = [require(request.path, place, shape, key) for key in _PERCENT]
+                box = [required_value(request.path, place, shape, key) for key in _PERCENT]
                 found.add(place, frame, box, label=label)
             elif shape.get("name") == "polygon":
-                points = np.column_stack([require(request.path, place, shape, f"all_points_{a}") for a in "xy"])
+                points = np.column_stack([required_value(request.path, place, shape, f"all_points_{a}") for a in "xy"])
                 mask = _polygon(request.path, place, points.ravel().tolist())
                 found.add(place, frame, mask.box(), label=label, mask=mask)
     return found.done(count)

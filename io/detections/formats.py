@@ -16,10 +16,10 @@ from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.values import printable
 
 JSON_FORMATS: tuple[tuple[str, Callable[[Any], bool], Callable[[Request, Any], Detections]], ...] = (
-    ("COCO results", json_formats.is_results, json_formats.read_results),
+    ("COCO results", json_formats.is_coco_results, json_formats.read_coco_results),
     ("COCO data set", json_formats.is_dataset, json_formats.read_dataset),
     ("MMDetection", json_formats.is_mmdetection, json_formats.read_mmdetection),
-    ("Ultralytics JSON", yolo.is_results, yolo.read_results),
+    ("Ultralytics JSON", yolo.is_ultralytics_results, yolo.read_ultralytics_results),
     ("Label Studio", annotation_tools.is_label_studio, annotation_tools.read_label_studio),
     ("VIA", annotation_tools.is_via, annotation_tools.read_via),
 )
@@ -90,7 +90,7 @@ def _read_folder(request: Request) -> tuple[str, Detections]:
     if all(map(json_formats.is_prediction, data)):
         return "MMDetection", json_formats.read_mmdetection(request, data)
     if all(map(yolo.is_frame_of_results, data)):
-        return "Ultralytics JSON", yolo.read_results(request, data)
+        return "Ultralytics JSON", yolo.read_ultralytics_results(request, data)
     wrong = next((k for k, one in enumerate(data) if not json_formats.is_prediction(one)), 0)
     raise FormatError(files[wrong], "", "JSON of no known detections", f"one of {', '.join(NAMES)}")
 

@@ -17,12 +17,12 @@ import numpy as np
 from stseg.arrays import Ints
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.masks import Mask, flat_polygons, run_lengths
-from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, read_json, require
+from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, read_json, required_value
 
 _KEYS = ("xmin", "ymin", "xmax", "ymax")
 
 
-def is_results(data: Any) -> bool:
+def is_coco_results(data: Any) -> bool:
     """Whether parsed JSON is a list of COCO results."""
     return (
         isinstance(data, list)
@@ -38,7 +38,7 @@ def is_dataset(data: Any) -> bool:
     return isinstance(data, dict) and "images" in data and "annotations" in data
 
 
-def read_results(request: Request, data: Any) -> Detections:
+def read_coco_results(request: Request, data: Any) -> Detections:
     """Detections of COCO results, with the image list where the rig names one."""
     if request.source.image_list is None:
         return _collect(request, data, None, {})
@@ -62,7 +62,7 @@ def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Map
     found = DetectionList(request.path)
     for index, row in enumerate(rows):
         place = f"detection {index}"
-        image = require(request.path, place, row, "image_id")
+        image = required_value(request.path, place, row, "image_id")
         if images is None:
             frame = _own_number(request.path, place, image)
         elif image in frame_of:
@@ -73,7 +73,7 @@ def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Map
             raise FormatError(request.path, place, f"image_id {image!r}", "the id of an image in the image list")
         category = row.get("category_id", "")
         mask = _mask(request.path, place, row.get("segmentation"))
-        box = row.get("bbox") or (mask.box() if mask is not None else require(request.path, place, row, "bbox"))
+        box = row.get("bbox") or (mask.box() if mask is not None else required_value(request.path, place, row, "bbox"))
         found.add(place, frame, box, row.get("score", 1.0), categories.get(category, str(category)), mask)
     return found.done(frames)
 
@@ -81,7 +81,7 @@ def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Map
 def _frames(request: Request, images: Any) -> tuple[dict[Any, int], int | None]:
     """Frame of each image id among the selected images, and their number."""
     chosen = [
-        (require(request.path, f"image {k}", one, "id"), str(one.get("file_name", "")))
+        (required_value(request.path, f"image {k}", one, "id"), str(one.get("file_name", "")))
         for k, one in enumerate(images)
         if not request.source.select or fnmatch(str(one.get("file_name", "")), request.source.select)
     ]
@@ -105,7 +105,7 @@ def _own_number(path: Path, place: str, image: Any) -> int:
 
 def _categories(path: Path, data: Mapping[str, Any]) -> dict[Any, str]:
     return {
-        require(path, f"category {k}", one, "id"): str(one.get("name", one["id"]))
+        required_value(path, f"category {k}", one, "id"): str(one.get("name", one["id"]))
         for k, one in enumerate(data.get("categories", []))
     }
 
@@ -142,7 +142,7 @@ def read_mmdetection(request: Request, data: Any) -> Detections:
 
 
 def _add(request: Request, found: DetectionList, place: str, frame: int, row: Any) -> None:
-    boxes, scores, labels = (require(request.path, place, row, key) for key in ("bboxes", "scores", "labels"))
+    boxes, scores, labels = (required_value(request.path, place, row, key) for key in ("bboxes", "scores", "labels"))
     masks = row.get("masks") or [None] * len(boxes)
     if not len(boxes) == len(scores) == len(labels) == len(masks):
         raise FormatError(request.path, place, "bboxes, scores, labels and masks of different lengths", "one each")
@@ -168,11 +168,11 @@ def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Dete
     for path, frame, people in zip(paths, frames.tolist(), data, strict=True):
         for index, person in enumerate(people):
             place = f"{path.name}, person {index}"
-            for view in require(request.path, place, person, "views"):
-                if require(request.path, place, view, "viewNum") != request.source.view:
+            for view in required_value(request.path, place, person, "views"):
+                if required_value(request.path, place, view, "viewNum") != request.source.view:
                     continue
                 has_view = True
-                corners = [require(request.path, place, view, key) for key in _KEYS]
+                corners = [required_value(request.path, place, view, key) for key in _KEYS]
                 if corners != [-1, -1, -1, -1]:
                     found.add_corners(place, frame, corners, label="person")
     if not has_view:

@@ -189,7 +189,7 @@ def _is_json(text: str) -> bool:
     return True
 
 
-def require(path: Path, place: str, values: Any, key: str) -> Any:
+def required_value(path: Path, place: str, values: Any, key: str) -> Any:
     """The value of a key; FormatError where it is missing."""
     if not isinstance(values, dict) or key not in values:
         raise FormatError(path, place, f"no {key}", f"the key {key}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.masks import Mask, flat_polygons, polygons
-from stseg.io.detections.record import DetectionList, Detections, Request, last_numbers, number, require
+from stseg.io.detections.record import DetectionList, Detections, Request, last_numbers, number, required_value
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
 
@@ -131,7 +131,7 @@ def is_frame_of_results(data: Any) -> bool:
     )
 
 
-def is_results(data: Any) -> bool:
+def is_ultralytics_results(data: Any) -> bool:
     """Whether parsed JSON is a list of frames of `Results.to_json`, one of them not empty."""
     return (
         isinstance(data, list)
@@ -141,23 +141,23 @@ def is_results(data: Any) -> bool:
     )
 
 
-def read_results(request: Request, data: Any) -> Detections:
+def read_ultralytics_results(request: Request, data: Any) -> Detections:
     """Detections of a list of frames, each the list that `Results.to_json` gives."""
     found = DetectionList(request.path)
     for frame, rows in enumerate(data):
         for index, row in enumerate(rows):
             place = f"frame {frame}, detection {index}"
-            box, mask = require(request.path, place, row, "box"), None
+            box, mask = required_value(request.path, place, row, "box"), None
             if segments := row.get("segments"):
                 mask = _segments(request.path, place, segments)
-            corners = [require(request.path, place, box, key) for key in ("x1", "y1", "x2", "y2")]
+            corners = [required_value(request.path, place, box, key) for key in ("x1", "y1", "x2", "y2")]
             found.add_corners(place, frame, corners, row.get("confidence", 1.0), str(row.get("name", "")), mask)
     return found.done(len(data))
 
 
 def _segments(path: Path, place: str, segments: Any) -> Mask | None:
     """The mask of an outline; None where it has no area."""
-    u, v = ([number(path, place, key, one) for one in require(path, place, segments, key)] for key in ("x", "y"))
+    u, v = ([number(path, place, key, one) for one in required_value(path, place, segments, key)] for key in ("x", "y"))
     if len(u) != len(v):
         raise FormatError(path, place, f"segments of {len(u)} x and {len(v)} y", "as many of each")
     try:

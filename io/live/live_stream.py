@@ -17,7 +17,7 @@ from stseg.arrays import AnyArray
 from stseg.config import LiveConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.recording.pictures import as_observation, reduced_picture
+from stseg.io.recording.pictures import picture_observation, reduced_picture
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.source_files import is_pattern
 
@@ -179,7 +179,7 @@ class LiveStream(Thread):
 
     def _keep(self, picture: AnyArray) -> None:
         source, camera = self._source, self._camera
-        view = as_observation(picture, source.kind, camera.size, source.path, f"camera {camera.name}")
+        view = picture_observation(picture, source.kind, camera.size, source.path, f"camera {camera.name}")
         with self._arrival:
             self.pictures.append(TimedPicture(now(), reduced_picture(view, self._factor)))
             while self.pictures[0].at < self.pictures[-1].at - self._kept:

@@ -33,7 +33,7 @@ from stseg.io.recording.rigs import write_rig
 from stseg.io.untrusted.values import require_utf8
 
 _ANYBODY = BodyPrior()
-Progress = Callable[[int, int], None]
+FrameProgress = Callable[[int, int], None]
 """Called after each frame with the number of finished frames and of all frames."""
 
 
@@ -83,7 +83,7 @@ def write_scene(
     body: BodyPrior = _ANYBODY,
     instances: bool = False,
     overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: FrameProgress | None = None,
 ) -> None:
     """Film a scene into a folder, which is made if it does not exist.
 

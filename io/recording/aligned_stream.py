@@ -21,7 +21,7 @@ from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.streams import Stream, open_stream
-from stseg.io.recording.time_alignment import align_in_time, coverage, with_alignment
+from stseg.io.recording.time_alignment import align_in_time, frame_coverage, with_alignment
 
 
 class AlignedStream:
@@ -165,10 +165,10 @@ class StreamIndex:
     notes: tuple[str, ...] = ()
     """Messages for the user, one line each."""
 
-    def coverage(self, recording: Recording) -> Flags:
+    def frame_coverage(self, recording: Recording) -> Flags:
         """Which frames of the indexed recording each camera shows, bool (camera, length)."""
         counts = [sum(map(len, files)) for files in self.times]
-        return coverage(with_alignment(recording, self.frame_at_tick), counts, self.length)
+        return frame_coverage(with_alignment(recording, self.frame_at_tick), counts, self.length)
 
     def multi_view_range(self, recording: Recording) -> tuple[int, int]:
         """First and stop of the part that at least two cameras show; all of it where a camera is required throughout.
@@ -177,7 +177,7 @@ class StreamIndex:
         """
         if any(source.on_missing == "error" for source in recording.sources):
             return 0, self.length
-        multiple = np.flatnonzero(self.coverage(recording).sum(axis=0) >= min(2, len(recording.sources)))
+        multiple = np.flatnonzero(self.frame_coverage(recording).sum(axis=0) >= min(2, len(recording.sources)))
         return (int(multiple[0]), int(multiple[-1]) + 1) if len(multiple) else (0, self.length)
 
 

@@ -48,7 +48,7 @@ def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) 
     picture = _decode(data, kind) if declared is not None else None
     if picture is None:
         raise SourceError(path, key, "a broken file", "an image that decodes")
-    return as_observation(picture, kind, size, path, key)
+    return picture_observation(picture, kind, size, path, key)
 
 
 def declared_size(data: bytes) -> tuple[int, int] | None:
@@ -102,7 +102,7 @@ def _decode(data: bytes, kind: SourceKind) -> AnyArray | None:
         return None
 
 
-def as_observation(picture: AnyArray, kind: SourceKind, size: tuple[int, int], place: Path, key: str) -> AnyArray:
+def picture_observation(picture: AnyArray, kind: SourceKind, size: tuple[int, int], place: Path, key: str) -> AnyArray:
     """A decoded picture as an array of its kind, see `read_picture`; SourceError where it is of another."""
     height, width = picture.shape[:2]
     if (width, height) != size:

@@ -141,7 +141,7 @@ def nearest_frames(position: Floats, period: float) -> Ints:
     return frame_at_tick
 
 
-def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
+def frame_coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
     """Which frames of a recording that is aligned in time each camera shows, bool (camera, length).
 
     `counts` are the numbers of frames of the cameras, `length` that of the recording.

@@ -20,7 +20,7 @@ from stseg.errors import SourceError
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
-from stseg.io.runfile.reading.hdf5_reading import read_attribute, read_text
+from stseg.io.runfile.reading.hdf5_reading import dataset_text, read_attribute
 from stseg.io.toml import parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.safe_hdf5 import read_whole
@@ -109,8 +109,8 @@ def read_provenance(group: h5py.Group) -> Provenance:
             raise ValueError(f"shown of camera {camera}: no frames by tick")
     return Provenance(
         printable(str(read_attribute(group, "created")))[: limits.NAME],
-        read_text(group["config"]),
-        read_text(group["rig"]),
+        dataset_text(group["config"]),
+        dataset_text(group["rig"]),
         Path(str(read_attribute(group, "rig_path"))),
         {name.decode(): number.decode() for name, number in read_whole(group["versions"]).tolist()},
         _checked_sources(group["sources"]),

@@ -145,7 +145,8 @@ class RunWriter:
         self._occupancy = _create_occupancy(file, rig, self._views)
         self._occupancy.attrs["kept"] = self._kept
         self._tables = {
-            name: _Table(_create_table(file, name, dtype)) for name, dtype in layout.table_types(len(cameras)).items()
+            name: _GrowingTable(_create_table(file, name, dtype))
+            for name, dtype in layout.table_types(len(cameras)).items()
         }
         file["trajectory"].attrs["fps"] = rig.frame_rate
         file["ghosts"].attrs["views"] = cameras
@@ -182,7 +183,7 @@ def packed_volume(log_odds: Singles, label: Labels) -> tuple[PackedFrame, Packed
     return packed_frame(whole[0]), packed_frame(whole[1])
 
 
-class _Table:
+class _GrowingTable:
     """A growing table; rows are buffered up to a chunk."""
 
     def __init__(self, dataset: h5py.Dataset) -> None:

@@ -58,7 +58,7 @@ def outlines(
 
 
 @kernel
-def paint(order: Ints, first: Ints, spans: Spans, assigned: Shorts) -> None:
+def paint_outlines(order: Ints, first: Ints, spans: Spans, assigned: Shorts) -> None:
     """Write the numbers of outlines into assigned (v, u), one after the other in an order: the last one shows."""
     for j in order:
         if first[j] >= 0:

@@ -76,7 +76,7 @@ def _reach(quantity: int, tall: float, tolerance: Floats, deviations: float) -> 
 
 
 @part
-def run_of(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, deviations: float) -> tuple[int, int]:
+def pillar_range(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, deviations: float) -> tuple[int, int]:
     """First and stop in `index.order` of the pillars of a class that a box may fit within so many tolerances.
 
     Parameters
@@ -133,7 +133,7 @@ def fill_fits(
         if tall + head + late < bottom - top:
             continue
         early = _reach(LOWER_EDGE_ABOVE, tall, tolerance, deviations)
-        first, stop = run_of(index, kind, box, tolerance, min(MATCH_LIMIT, deviations))
+        first, stop = pillar_range(index, kind, box, tolerance, min(MATCH_LIMIT, deviations))
         for k in range(np.uint64(first), np.uint64(stop)):  # most pillars are decided by their edges
             if abs(index.top[k] - top) > head or not -late <= index.bottom[k] - bottom <= early:
                 continue

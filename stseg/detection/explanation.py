@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Shorts
-from stseg.bodies.outlines import paint
+from stseg.bodies.outlines import paint_outlines
 from stseg.bodies.views import BoxView, PixelView, View
-from stseg.detection.ghosts import prior_log_odds, rejected_candidates
+from stseg.detection.ghosts import candidate_prior_log_odds, rejected_candidates
 from stseg.detection.problem import BoxEvidence, DetectionProblem
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.refined_people import RefinedPeople, refined_members
@@ -34,7 +34,8 @@ def explained_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:
     bodies = Candidates(ground, refined.track_sizes.height, refined.track_sizes.width)
     people = People(
         bodies.ground, bodies.height, bodies.width, refined.covariance, estimate.losses, score.view_evidence,
-        _visibility(estimate), prior_log_odds(estimate, members, score.track_index), score.track_index, refined.sizes,
+        _visibility(estimate), candidate_prior_log_odds(estimate, members, score.track_index), score.track_index,
+        refined.sizes,
     )  # fmt: skip
     pixel_assignment = [
         pixels if isinstance(view, PixelView) else _painted(view, bodies)
@@ -93,5 +94,5 @@ def _painted(view: View, people: Candidates) -> Shorts:
     """The person with the nearest body at each raster pixel of a view, int16 (v, u); -1 for none."""
     first, spans, _ = view.outlines(people.ground, people.height, people.width)
     owner = np.full(view.shape, -1, np.int16)
-    paint(np.argsort(-view.distance(people.ground), kind="stable"), first, spans, owner)
+    paint_outlines(np.argsort(-view.distance(people.ground), kind="stable"), first, spans, owner)
     return owner

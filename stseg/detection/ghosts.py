@@ -23,14 +23,17 @@ def rejected_candidates(estimate: MapEstimate) -> People:
     rejected, additions = estimate.others, estimate.other_additions
     pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
     covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))
-    prior, sizes = prior_log_odds(estimate, rejected, additions.track_index), Sizes.of_population(len(rejected), body)
+    prior, sizes = (
+        candidate_prior_log_odds(estimate, rejected, additions.track_index),
+        Sizes.of_population(len(rejected), body),
+    )
     return People(
         pool.ground, pool.height, pool.width, covariance, additions.gain, additions.view_evidence,
         np.ones_like(additions.view_evidence), prior, births, sizes,
     )  # fmt: skip
 
 
-def prior_log_odds(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:
+def candidate_prior_log_odds(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:
     """Log-odds of candidates (n,) with their tracks, -1 for births, without the evidence of any view: nats, (n,)."""
     problem = estimate.problem
     prior = problem.parameters.prior_log_odds + problem.size_prior[candidates]

@@ -14,12 +14,6 @@ _PAIR = 1e3  # reward of a pair, metres: more than the distances of a whole fram
 _CONTINUATION_REWARD = 1e6  # reward of a continued pair, metres: more than all pairs of a frame
 
 
-def distances(person_ground: Floats, track_ground: Floats) -> Floats:
-    """Metres between every person (n, 2) and every track (m, 2), float64 (n, m)."""
-    distance_of_frames = person_ground[:, None] - track_ground[None]
-    return np.hypot(distance_of_frames[..., 0], distance_of_frames[..., 1])
-
-
 def similarity(distance: Floats, radius: float) -> Floats:
     """1 for the same place, falling to 0 at `radius` metres and beyond; the shape of `distance`."""
     return np.maximum(0.0, 1.0 - distance / radius)
@@ -139,7 +133,7 @@ def align_frames(
     person_ground, track_ground = _ground(truth), _ground(trajectory)
     distance_of_frames = []
     for people, tracks in zip(_runs(truth, numbers), _runs(trajectory, numbers), strict=True):
-        distance = distances(person_ground[people], track_ground[tracks])
+        distance = _distances(person_ground[people], track_ground[tracks])
         if not (relevant[people].all() and evaluated[tracks].all()):
             rows, columns = match(distance, gate)
             evaluated[tracks][columns] = relevant[people][rows]
@@ -195,3 +189,9 @@ def _inside(rows: Rows, area: Area | None) -> Flags:
         return np.ones(len(rows), bool)
     x, y = rows["x"], rows["y"]
     return np.asarray((x >= area[0]) & (y >= area[1]) & (x <= area[2]) & (y <= area[3]))
+
+
+def _distances(person_ground: Floats, track_ground: Floats) -> Floats:
+    """Metres between every person (n, 2) and every track (m, 2), (n, m); a judge shares no code with what it judges."""
+    distance = person_ground[:, None] - track_ground[None]
+    return np.hypot(distance[..., 0], distance[..., 1])

@@ -21,7 +21,7 @@ LARGEST_SIDE = 1024
 UNSEEN = -1
 """In place of a level: the view does not see the cell."""
 
-Sums = NDArray[np.uint32]
+SummedArea = NDArray[np.uint32]
 Levels = NDArray[np.int16]
 """int16 (plane, y, x): mean likelihood of each cell's footprint in units of 1 / TOP_LEVEL, or UNSEEN."""
 
@@ -29,7 +29,7 @@ Levels = NDArray[np.int16]
 class SumTable(NamedTuple):
     """Sums over a part of a view, the column and row where that part begins, and the lowest level there."""
 
-    sums: Sums
+    sums: SummedArea
     left: int
     top: int
     lowest: int
@@ -43,7 +43,7 @@ class SumTable(NamedTuple):
 
     def filled(self, likelihood: Singles) -> Self:
         """The table of a view's map (v, u); the array of sums is used anew."""
-        return self._replace(lowest=fill_sums(likelihood, self.left, self.top, self.sums))
+        return self._replace(lowest=fill_summed_area(likelihood, self.left, self.top, self.sums))
 
 
 @kernel
@@ -55,7 +55,7 @@ def level_of(likelihood: np.float32) -> np.int32:
 
 
 @kernel
-def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
+def fill_summed_area(likelihood: Singles, left: int, top: int, sums: SummedArea) -> int:
     """Fill sums (v + 1, u + 1), 0 in the first row and column: the levels of all pixels above and to the left.
 
     Parameters
@@ -93,7 +93,7 @@ def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
 
 
 @kernel
-def sum_of(sums: Sums, left: int, top: int, right: int, bottom: int) -> np.uint32:
+def sum_of(sums: SummedArea, left: int, top: int, right: int, bottom: int) -> np.uint32:
     """Sum over the pixels of rows top..bottom - 1 and columns left..right - 1."""
     # Unsigned places: none is negative, which is not asked here.
     u, v, stop, end = np.uint64(left), np.uint64(top), np.uint64(right), np.uint64(bottom)

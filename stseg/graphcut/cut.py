@@ -13,7 +13,7 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Flags, Labels
 from stseg.graphcut.grid_energy import GridEnergy
-from stseg.graphcut.lattice import Lattice, cells, neighbour, spread
+from stseg.graphcut.lattice import Lattice, cells, neighbour, node_values
 from stseg.graphcut.max_flow import Graph, solve
 from stseg.graphcut.sign_sets import LABEL_ONE, LABEL_ZERO, UNDECIDED
 from stseg.kernels.accelerate import kernel, part
@@ -117,9 +117,9 @@ class Reduction:
 
 def reduce(energy: GridEnergy) -> Reduction:
     """Decide cells by both rules."""
-    lattice, capacity, unary = energy.lattice, np.repeat(energy.capacity, 2), spread(energy.unary)
+    lattice, capacity, unary = energy.lattice, np.repeat(energy.capacity, 2), node_values(energy.unary)
     if energy.signs.weak > WEAK_SHARE_LIMIT * energy.unary.size:
-        state = energy.spread(np.full(energy.unary.shape, UNDECIDED, np.uint8))
+        state = energy.node_values(np.full(energy.unary.shape, UNDECIDED, np.uint8))
         left = np.flatnonzero(state).astype(np.int32)
         return Reduction(lattice, capacity, state, left, unary[left])
     state = energy.signs.state.copy()

@@ -18,7 +18,7 @@ from stseg.arrays import Flags, Ints
 from stseg.graphcut.expansion_kernels import (
     Arcs,
     Neighbours,
-    fill_cheapest,
+    fill_cheapest_labels,
     fill_move,
     fill_neighbours,
     prune_unchanged,
@@ -67,7 +67,7 @@ class LabelEnergy:
     def cheapest_labels(self) -> Ints:
         """Label of least unary cost of each node, int64 (n,); of several the first."""
         labels = np.full(self.cells, BACKGROUND, np.int64)
-        fill_cheapest(self.first, self.label, self.cost, labels)
+        fill_cheapest_labels(self.first, self.label, self.cost, labels)
         return labels
 
 

@@ -37,7 +37,7 @@ class Arcs(NamedTuple):
 
 
 @kernel
-def fill_cheapest(first: Ints, label: Ints, cost: Ints, labels: Ints) -> None:
+def fill_cheapest_labels(first: Ints, label: Ints, cost: Ints, labels: Ints) -> None:
     """Fill labels (n,), which hold the background, with those of least cost below 0; of several the first."""
     for p in range(len(labels)):
         least = 0

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels
-from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, spread
+from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, node_values
 from stseg.graphcut.sign_sets import GUARD, SignSets, sign_sets
 from stseg.kernels.accelerate import kernel
 
@@ -57,14 +57,15 @@ class GridEnergy:
         """The sets of cells labelled by their sign."""
         return sign_sets(self.unary, self.lattice, self.capacity, self.present)
 
-    def spread(self, values: AnyArray) -> AnyArray:
+    def node_values(self, values: AnyArray) -> AnyArray:
         """Values of cells (time, plane, y, x) at their nodes, 0 at guards and where there is no cell; (node,)."""
-        return spread(values if self.present is None else np.where(self.present, values, np.zeros(1, values.dtype)))
+        present = values if self.present is None else np.where(self.present, values, np.zeros(1, values.dtype))
+        return node_values(present)
 
     def of(self, labels: Labels | Flags) -> int:
         """Energy of a labelling (time, plane, y, x) relative to all 0; labels bool or 0 / 1."""
         occupied = labels != 0
-        return int(_energy(self.unary, occupied, spread(occupied), self.signs.state, self.lattice, self.capacity))
+        return int(_energy(self.unary, occupied, node_values(occupied), self.signs.state, self.lattice, self.capacity))
 
     def edge_values(self, volume: AnyArray) -> Iterator[tuple[AnyArray, AnyArray]]:
         """Values of a volume (time, plane, y, x) at both ends of all edges, offset by offset."""

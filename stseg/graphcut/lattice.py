@@ -62,7 +62,7 @@ def _fill_steps(successor: Labels, planes: int, forward: Labels, backward: Label
                         forward[node], backward[node + step] = step, -step
 
 
-def spread(volume: AnyArray) -> AnyArray:
+def node_values(volume: AnyArray) -> AnyArray:
     """Values of cells (time, plane, y, x) at their nodes, 0 at guards; (node,)."""
     nodes = np.zeros(_number(volume.shape), volume.dtype)
     cells(nodes, volume.shape)[:] = volume

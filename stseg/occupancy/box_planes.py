@@ -21,7 +21,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
 from stseg.bodies.box_fit import MATCH_LIMIT, half_square
-from stseg.bodies.pillar_index import PillarIndex, run_of
+from stseg.bodies.pillar_index import PillarIndex, pillar_range
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.kernels.accelerate import kernel
@@ -111,7 +111,7 @@ def fill_fit(
                     fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
             continue
         for kind in range(len(index.tallest)):
-            first, stop = run_of(index, kind, box, tolerance, MATCH_LIMIT)
+            first, stop = pillar_range(index, kind, box, tolerance, MATCH_LIMIT)
             for k in range(first, stop):
                 h, cell = index.order[k] // ground_cells, index.order[k] % ground_cells
                 body = pillars[index.order[k]]

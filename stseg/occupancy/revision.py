@@ -18,7 +18,7 @@ _BODY_LOG_ODDS = 1.0
 """Least log-odds of the cells inside a body that was added to a frame, nats."""
 
 
-def prior_log_odds(config: OccupancyConfig) -> float:
+def cell_prior_log_odds(config: OccupancyConfig) -> float:
     """Prior log-odds of a cell within reach of no person, nats."""
     return float(logit(config.occupied_share))
 
@@ -46,7 +46,7 @@ def revised_volume(
     places = np.flatnonzero((near_before != near_people) | (body >= 0))
     body = body[places]
     change = near_people[places].astype(np.float32) - near_before[places]
-    prior = NEAR_PRIOR - prior_log_odds(config.occupancy)
+    prior = NEAR_PRIOR - cell_prior_log_odds(config.occupancy)
     log_odds = volume.at(places) + (prior * change).astype(np.float32)
     tall = np.append(added.height, -1.0)[body] >= grid.heights[:, None]
     revised = np.where(tall & (body >= 0), np.fmax(log_odds, np.float32(_BODY_LOG_ODDS)), log_odds)

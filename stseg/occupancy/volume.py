@@ -22,7 +22,7 @@ from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
-from stseg.occupancy.revision import NEAR_PRIOR, prior_log_odds
+from stseg.occupancy.revision import NEAR_PRIOR, cell_prior_log_odds
 from stseg.occupancy.shown_cells import CellTables, ShownCells, blocks_of, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_share, mark_people
 from stseg.records.people import Explanation
@@ -68,7 +68,7 @@ class Occupancy:
         self.views: Bytes = self.sampling.views()
         self.heights = np.asarray(body.heights)
         self.height_mean, self.height_spread = body.height_mean, body.height_spread
-        self.prior = prior_log_odds(config)
+        self.prior = cell_prior_log_odds(config)
         self._sums = [SumTable.over(region) for region in self.sampling.regions()]
         self._tables = CellTables(self.sampling.footprint)
         self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]

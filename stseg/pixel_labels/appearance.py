@@ -13,7 +13,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Singles
 from stseg.kernels.accelerate import kernel
-from stseg.pixel_labels.label_likelihood import LabelLikelihood, Patches
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, PersonPatches
 
 SLICES = 6
 """Slices of a body: about head, chest, belly, thighs, shins and feet."""
@@ -25,7 +25,7 @@ _PIXELS = 100.0
 """Pixels as which the colours of all tracks count in those of one."""
 
 
-class Appearance(NamedTuple):
+class ViewAppearance(NamedTuple):
     """Colours of tracks in one view."""
 
     track: Ints
@@ -69,7 +69,7 @@ class ColourSums(NamedTuple):
         people, corner = likelihood.people, (likelihood.left, likelihood.top)
         _add_colours(people, corner, rows, place, image, self)
 
-    def appearance(self) -> Appearance:
+    def appearance(self) -> ViewAppearance:
         """Means and covariances, shrunk to those of all tracks."""
         count, first, second = (
             sums + _PIXELS * _mean_of_all(sums, self.pixels) for sums in (self.pixels, self.first, self.second)
@@ -78,7 +78,7 @@ class ColourSums(NamedTuple):
         covariance = second / count[..., None, None] - mean[..., :, None] * mean[..., None, :] + _NOISE**2 * np.eye(3)
         peak = np.asarray(1 / np.sqrt((2 * np.pi) ** 3 * np.linalg.det(covariance)), float)
         precision = np.asarray(np.linalg.inv(covariance), float)
-        return Appearance(self.track, mean, precision, peak)
+        return ViewAppearance(self.track, mean, precision, peak)
 
 
 def _mean_of_all(sums: Floats, count: Floats) -> Floats:
@@ -105,7 +105,7 @@ def slice_of(v: float, head: float, feet: float) -> int:
 
 @kernel
 def _add_colours(
-    people: Patches, corner: tuple[int, int], rows: BodyRows, place: Ints, image: Bytes, sums: ColourSums
+    people: PersonPatches, corner: tuple[int, int], rows: BodyRows, place: Ints, image: Bytes, sums: ColourSums
 ) -> None:
     """Add colours of pixels that are surely the person's."""
     edges, share = people.edges, people.share
@@ -130,7 +130,7 @@ _UNIFORM = 256.0**-3
 
 
 def colour_log_ratios(
-    appearance: Appearance, likelihood: LabelLikelihood, rows: BodyRows, track: Ints, image: Bytes
+    appearance: ViewAppearance, likelihood: LabelLikelihood, rows: BodyRows, track: Ints, image: Bytes
 ) -> Singles:
     """Log-ratio of a pixel's colour for a person to that for the mean of all who may cover it.
 
@@ -153,12 +153,12 @@ def colour_log_ratios(
 
 @kernel
 def _fill_densities(
-    people: Patches,
+    people: PersonPatches,
     corner: tuple[int, int],
     rows: BodyRows,
     place: Ints,
     image: Bytes,
-    appearance: Appearance,
+    appearance: ViewAppearance,
     density: Singles,
 ) -> None:
     """Fill p(c | j, s) / 256^-3 at the pixels that a person may cover."""
@@ -181,7 +181,7 @@ def _fill_densities(
 
 @kernel
 def _fill_log_ratios(
-    people: Patches, corner: tuple[int, int], density: Singles, total: Singles, weight: Singles, ratio: Singles
+    people: PersonPatches, corner: tuple[int, int], density: Singles, total: Singles, weight: Singles, ratio: Singles
 ) -> None:
     """Fill the logarithm of each density's ratio to the mean by shares, nats."""
     left, top = corner

@@ -34,7 +34,7 @@ _THINNEST = 0.3
 """Least width, as a share of the mean."""
 
 
-class Patches(NamedTuple):
+class PersonPatches(NamedTuple):
     """One value for each pixel of a rectangle around each person."""
 
     edges: Ints
@@ -54,7 +54,7 @@ class Patches(NamedTuple):
         ]
 
 
-def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig, body: BodyConfig) -> Patches:
+def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig, body: BodyConfig) -> PersonPatches:
     """Share of each person's draws that cover each pixel of a view."""
     deviates, count = _deviates(config.samples), len(people)
     root_covariance = np.linalg.cholesky(people.covariance + config.position_noise**2 * np.eye(2))
@@ -67,7 +67,7 @@ def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig, 
     begin = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
     share = np.zeros(begin[-1], np.float32)
     _fill_shares(first, spans, config.samples, edges, begin, share)
-    return Patches(edges, begin, share)
+    return PersonPatches(edges, begin, share)
 
 
 @lru_cache(maxsize=8)
@@ -135,7 +135,7 @@ class LabelLikelihood(NamedTuple):
     """Pixels."""
     background: Singles
     """float32 (v, u): p_0, 0..1; has the size of the window."""
-    people: Patches
+    people: PersonPatches
     """p_j at the pixels of each person's rectangle, in image coordinates."""
 
     @property
@@ -145,7 +145,7 @@ class LabelLikelihood(NamedTuple):
         return slice(self.top, self.top + rows), slice(self.left, self.left + columns)
 
 
-def visible_shares(patches: Patches, distance: Floats) -> LabelLikelihood:
+def visible_shares(patches: PersonPatches, distance: Floats) -> LabelLikelihood:
     """Visible shares from coverage; distance float64 (n,) of people from the camera, metres."""
     edges, visible = patches.edges, patches.edges[:, 2] > patches.edges[:, 0]
     left, top = edges[visible, :2].min(0, initial=np.iinfo(np.int64).max) if visible.any() else (0, 0)
@@ -159,4 +159,4 @@ def visible_shares(patches: Patches, distance: Floats) -> LabelLikelihood:
         background[here] -= visible_share
         share[values] = visible_share.ravel()
     np.maximum(background, 0, out=background)
-    return LabelLikelihood(int(left), int(top), background, Patches(edges, patches.first, share))
+    return LabelLikelihood(int(left), int(top), background, PersonPatches(edges, patches.first, share))

@@ -19,7 +19,7 @@ from stseg.config import LabelConfig
 from stseg.graphcut.expansion import BACKGROUND, LabelEnergy
 from stseg.graphcut.grid_energy import QUANTUM
 from stseg.kernels.accelerate import kernel
-from stseg.pixel_labels.label_likelihood import LabelLikelihood, Patches
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, PersonPatches
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _edge_sums(across: Labels, down: Labels) -> Labels:
 
 @kernel
 def _fill_costs(
-    people: Patches,
+    people: PersonPatches,
     corner: tuple[int, int],
     background: Singles,
     foreground: Singles,

@@ -11,7 +11,7 @@ from stseg.bodies.pillars import BodyTable
 from stseg.config import BodyConfig, LabelConfig
 from stseg.geometry import Camera, Rig
 from stseg.graphcut.expansion import expand
-from stseg.pixel_labels.appearance import Appearance, BodyRows, ColourSums, colour_log_ratios
+from stseg.pixel_labels.appearance import BodyRows, ColourSums, ViewAppearance, colour_log_ratios
 from stseg.pixel_labels.label_likelihood import LabelLikelihood, PlacedPeople, pillar_patches, visible_shares
 from stseg.pixel_labels.pixel_energy import admissible, edge_costs, most_likely_labels, pixel_energy
 
@@ -23,7 +23,7 @@ class ViewLabels:
         self.camera, self.table, self.config, self.body = camera, table, config, body
 
     def label(
-        self, people: PlacedPeople, foreground: Singles, image: Bytes | None, appearance: Appearance | None = None
+        self, people: PlacedPeople, foreground: Singles, image: Bytes | None, appearance: ViewAppearance | None = None
     ) -> Labels:
         """Person visible at each pixel, int32 (v, u): 1 + the index of the person, 0 for background.
 

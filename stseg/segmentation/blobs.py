@@ -11,13 +11,13 @@ from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
 from stseg.records.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_measures import BlobMeasures, fill_ground_labels, fill_measures, fill_nearest
-from stseg.segmentation.patches import Patches
+from stseg.segmentation.patches import GroundPatches
 
 _EIGHT = np.ones((3, 3), int)
 
 
 def find_blobs(
-    label: Labels, log_odds: Singles, people_ground: Floats, people_track: Ints, reach: float, patches: Patches
+    label: Labels, log_odds: Singles, people_ground: Floats, people_track: Ints, reach: float, patches: GroundPatches
 ) -> Blobs:
     """Blobs of one frame.
 
@@ -65,7 +65,7 @@ def _in_ground_order(occupied: Flags, place: Ints) -> tuple[Labels, int]:
     return rank[component], number
 
 
-def _in_volume(ground: Floats, log_odds: Singles, patches: Patches) -> Flags:
+def _in_volume(ground: Floats, log_odds: Singles, patches: GroundPatches) -> Flags:
     """Places (n, 2) above which the volume has a cell that some view sees, bool (n,)."""
     grid = patches.grid
     _, rows, columns = grid.shape
@@ -94,7 +94,9 @@ def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid)
     )
 
 
-def _measured(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, patches: Patches) -> Blobs:
+def _measured(
+    cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, patches: GroundPatches
+) -> Blobs:
     n, grid = len(track), patches.grid
     found = BlobMeasures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
     meet = fill_measures(cells, track, label, log_odds, patches.ground, grid.heights, found)

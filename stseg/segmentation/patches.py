@@ -37,7 +37,7 @@ _EIGHT = np.ones((3, 3), bool)
 
 
 @dataclass(frozen=True)
-class Patches:
+class GroundPatches:
     """Rectangles of a grid's ground, beside each other on a sheet (row, column) with an empty column between them."""
 
     grid: Grid

@@ -19,7 +19,7 @@ from stseg.io.outputs.label_images import LabelImages
 from stseg.io.recording.frames import FrameSet, open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
-from stseg.pixel_labels.appearance import Appearance, ColourSums
+from stseg.pixel_labels.appearance import ColourSums, ViewAppearance
 from stseg.pixel_labels.label_likelihood import PlacedPeople
 from stseg.pixel_labels.views import ViewLabels, view_labels
 from stseg.reporting.pictures.colours import track_palette
@@ -120,7 +120,7 @@ def _frame_sets(
 
 def _appearances(
     run: Run, views: Sequence[ViewLabels], people: dict[int, Rows], frames: Ints, reporter: Reporter
-) -> dict[int, Appearance]:
+) -> dict[int, ViewAppearance]:
     """Colours of the tracks in each view that delivers colours, learned from frames all over the selection."""
     tracks = np.unique(np.concatenate([rows["id"] for rows in people.values()])).astype(np.int64)
     kinds = [source.source.kind for source in run.recording.sources]
@@ -138,7 +138,7 @@ def _appearances(
 
 
 def _ids(
-    view: ViewLabels, people: Rows, pixels: Singles | None, observation: Observation, colours: Appearance | None
+    view: ViewLabels, people: Rows, pixels: Singles | None, observation: Observation, colours: ViewAppearance | None
 ) -> Ints:  # fmt: skip
     """Ids of the tracks that a view shows, int64 (v, u); all 0 for a blind view."""
     if pixels is None:

@@ -25,7 +25,7 @@ from stseg.segmentation.cell_labelling import WindowDetections, WindowLabels, la
 from stseg.segmentation.cell_motion import motion_field, same_tracks
 from stseg.segmentation.cut_energy import build_energy
 from stseg.segmentation.label_energy import BodyShape
-from stseg.segmentation.patches import Patches, mark_places, people_squares
+from stseg.segmentation.patches import GroundPatches, mark_places, people_squares
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows, views_at
 from stseg.trackers.window_existence import TrackedFrame, WindowExistence
@@ -105,7 +105,7 @@ class CutTracker:
         self.committed = window.commit_stop
         return self._commit(window, frames, patches, label, blobs, decision, row)
 
-    def _cut_out(self, frames: list[TrackedFrame]) -> tuple[Patches, Singles, GridEnergy]:
+    def _cut_out(self, frames: list[TrackedFrame]) -> tuple[GroundPatches, Singles, GridEnergy]:
         """Patches of the ground that are enough, and the window's log-odds (time, plane, row, column) and energy there.
 
         See `stseg.segmentation.patches`.
@@ -114,7 +114,7 @@ class CutTracker:
         if self.solver is not SOLVERS["stseg"]:  # others take whole grids
             squares[:] = True
         while True:
-            patches = Patches.of(grid, squares)
+            patches = GroundPatches.of(grid, squares)
             log_odds = np.stack([patches.log_odds(tracked.fused.volume) for tracked in frames])
             energy = self._energy(frames, patches, log_odds)
             if not patches.border.any():
@@ -136,7 +136,7 @@ class CutTracker:
         mark_places(squares, np.concatenate([one.fused.volume.occupied_places() for one in frames]), grid)
         return squares
 
-    def _energy(self, frames: list[TrackedFrame], patches: Patches, log_odds: Singles) -> GridEnergy:
+    def _energy(self, frames: list[TrackedFrame], patches: GroundPatches, log_odds: Singles) -> GridEnergy:
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
             motion_field(
@@ -150,7 +150,7 @@ class CutTracker:
         return build_energy(log_odds, successor, grid, self.config.segmentation, present)
 
     def _divide(
-        self, window: Window, frames: list[TrackedFrame], patches: Patches, energy: GridEnergy, occupied: Flags
+        self, window: Window, frames: list[TrackedFrame], patches: GroundPatches, energy: GridEnergy, occupied: Flags
     ) -> WindowLabels:
         """Label the occupied cells with the filter tracks of this window and of active tracks."""
         tails = [track.tail for track in self.association.active]
@@ -167,7 +167,7 @@ class CutTracker:
         self,
         window: Window,
         frames: list[TrackedFrame],
-        patches: Patches,
+        patches: GroundPatches,
         label: Labels,
         blobs: list[Blobs],
         decision: WindowAssignment,

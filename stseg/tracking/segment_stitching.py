@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Ints, Labels, Rows
+from stseg.geometry.distances import distances
 from stseg.records.tables import EVENT, TRAJECTORY
-from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.assignment import assign
 
 _EventRow = tuple[int, bytes, int, int, bytes]
 """A row of EVENT."""

@@ -66,7 +66,7 @@ class LiveCorrections:
             return np.zeros(0, CORRECTION)
         self._due = decided + round(live.correction_interval * self._rate)
         found = self._decided_again(decided, new_id)
-        self._rows = corrected(self._rows, found)
+        self._rows = corrected_ids(self._rows, found)
         return found
 
     def _decided_again(self, decided: int, new_id: Callable[[], int]) -> Rows:
@@ -81,7 +81,7 @@ class LiveCorrections:
         return np.array(found, CORRECTION)
 
 
-def corrected(rows: Rows, corrections: Rows) -> Rows:
+def corrected_ids(rows: Rows, corrections: Rows) -> Rows:
     """TRAJECTORY rows under corrected ids: those of one decision hold at once, and one decision after another."""
     named = rows.copy()
     for decided in np.unique(corrections["decision_frame"]).tolist():
@@ -149,7 +149,7 @@ class LiveIds:
         self._issued = max(
             int(ids.max(initial=0)) for ids in (rows["id"], corrections["id"], corrections["corrected_id"])
         )
-        self._recent = self._last(corrected(rows, corrections))
+        self._recent = self._last(corrected_ids(rows, corrections))
 
     def begin(self, lead: Rows) -> Names:
         """Names for a new segment, from the TRAJECTORY rows of its warm-up."""
@@ -177,7 +177,7 @@ class LiveIds:
 
     def correct(self, corrections: Rows) -> None:
         """Take CORRECTION rows into account."""
-        self._recent = corrected(self._recent, corrections)
+        self._recent = corrected_ids(self._recent, corrections)
 
     def _last(self, rows: Rows) -> Rows:
         return np.asarray(rows[rows["frame"] > rows["frame"].max(initial=0) - self._kept])

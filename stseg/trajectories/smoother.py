@@ -12,8 +12,8 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig, TrackingConfig
+from stseg.geometry.distances import distances
 from stseg.records.tables import TRAJECTORY
-from stseg.tracking.filter.assignment import distances
 from stseg.tracking.filter.motion_model import process_noise, transition
 from stseg.tracking.filter.track_filter import EXCLUSION_RADIUS
 from stseg.tracking.row_groups import rows_of_tracks

@@ -19,7 +19,7 @@ from stseg.baselines.huang_wang_2012.pillar_strips import Pillars
 from stseg.config import BodyConfig, ProposalConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.geometry.summed_area import TOP_LEVEL, fill_sums
+from stseg.geometry.summed_area import TOP_LEVEL, fill_summed_area
 
 FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
 HEIGHTS = np.array([1.5, 1.7, 1.9])
@@ -69,7 +69,7 @@ def test_the_kernel_is_the_definition(likelihood: Singles, pillars: Pillars, out
         rng.dirichlet(np.ones(n)) for n in (pillars.middle.shape[1] - pillars.base, len(widths))
     )
     sums = np.empty((likelihood.shape[0] + 1, likelihood.shape[1] + 1), np.uint32)
-    fill_sums(likelihood, 0, 0, sums)
+    fill_summed_area(likelihood, 0, 0, sums)
     found = np.empty(1)
     fill_chance(
         sums, pillars.upright, pillars.edge, pillars.middle, pillars.half, pillars.base, widths, height_share,

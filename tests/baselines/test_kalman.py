@@ -12,7 +12,7 @@ from scenes import CONFIG, FRAME_RATE, found, people, room
 
 from stseg.arrays import Floats, Rows
 from stseg.baselines.huang_wang_2012.kalman import KalmanTracker
-from stseg.baselines.huang_wang_2012.kalman_filters import corrected, initial, innovations, predicted
+from stseg.baselines.huang_wang_2012.kalman_filters import corrected_filters, initial, innovations, predicted_filters
 from stseg.config import Config, KalmanConfig, MotionConfig
 from stseg.errors import ConfigError
 from stseg.records.sparse_volume import SparseVolume
@@ -64,7 +64,7 @@ def test_filters_side_by_side_are_each_a_plain_one(seed: int, length: int, secon
     error = np.tile(noise * np.eye(2), (3, 1, 1))
     filters = initial(paths[:, 0], error, config.speed_spread)
     for step in range(1, length):
-        filters = corrected(predicted(filters, seconds, config), np.arange(3), paths[:, step], error)
+        filters = corrected_filters(predicted_filters(filters, seconds, config), np.arange(3), paths[:, step], error)
     for path, state, covariance in zip(paths, *filters, strict=True):
         expected = plain(path, noise, seconds, config)
         np.testing.assert_allclose(state, expected[0], atol=1e-9)
@@ -73,7 +73,7 @@ def test_filters_side_by_side_are_each_a_plain_one(seed: int, length: int, secon
 
 def test_innovation_is_twice_the_negative_log_likelihood() -> None:
     born = initial(np.array([[0.0, 0.0], [1.0, 2.0]]), np.tile(0.04 * np.eye(2), (2, 1, 1)), 0.8)
-    filters = predicted(born, 0.2, MotionConfig())
+    filters = predicted_filters(born, 0.2, MotionConfig())
     place, noise = np.array([[0.3, -0.1]]), np.array([[[0.05, 0.01], [0.01, 0.02]]])
     squares, cost = innovations(filters, place, noise)
     for k in range(2):

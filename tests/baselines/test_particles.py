@@ -13,11 +13,11 @@ from scenes import CONFIG, SIZE, corner_cameras, found, looking, mask, people, r
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.baselines.colour_views import colour_views
-from stseg.baselines.kim_davis_2006.appearance import SAMPLES, Appearance
+from stseg.baselines.kim_davis_2006.appearance import SAMPLES, PersonAppearance
 from stseg.baselines.kim_davis_2006.axes import HYPOTHESIS_WEIGHT, _middle_of_shortest_half, fill_axes, intersect_axes
 from stseg.baselines.kim_davis_2006.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
 from stseg.baselines.kim_davis_2006.colours import BINS, FALL, bins_of, fill_density, histogram, normalised
-from stseg.baselines.kim_davis_2006.filter import estimate, resampled, weights
+from stseg.baselines.kim_davis_2006.filter import estimate, particle_weights, resampled
 from stseg.baselines.kim_davis_2006.likelihood import NEUTRAL, add_misfit
 from stseg.baselines.kim_davis_2006.search import search
 from stseg.baselines.kim_davis_2006.segmentation import UNASSIGNED, Canvas, fill_unoccluded, segment
@@ -257,7 +257,7 @@ def test_misfit_is_equations_6_and_7(standing: Floats) -> None:
 def test_particles_are_drawn_by_their_weights() -> None:
     rng = np.random.default_rng(2)
     particles = np.arange(8.0).reshape(4, 1, 2)
-    weight = weights(np.array([0.0, 0.0, 50.0, 1.0]), 2.0)
+    weight = particle_weights(np.array([0.0, 0.0, 50.0, 1.0]), 2.0)
     assert weight.sum() == pytest.approx(1)
     assert weight[3] / weight[0] == pytest.approx(np.exp(-2.0))
     drawn = np.concatenate([resampled(particles, weight, rng)[:, 0, 0] for _ in range(500)])
@@ -271,7 +271,7 @@ def test_particles_are_drawn_by_their_weights() -> None:
 def test_appearances_fill_and_are_renewed_slowly() -> None:
     rng = np.random.default_rng(0)
     red, blue = np.full((300, 3), (200, 10, 90), np.uint8), np.full((300, 3), (10, 10, 90), np.uint8)
-    one = Appearance.unknown().learned(1, red[:10], 0.1, rng)
+    one = PersonAppearance.unknown().learned(1, red[:10], 0.1, rng)
     assert one.usable_samples.tolist() == [0, 0, 0]  # too few
     assert one.reference.sum() == 0
     full = one.learned(1, red, 0.1, rng)
@@ -324,7 +324,7 @@ def test_the_search_goes_to_the_person_from_beside() -> None:
     standing = people((0.2, 0.1))
     views = [ParticleView(camera, 64) for camera in RIG.cameras]
     colour = colour_views(shown(standing), "particles", 0)
-    rng, appearance = np.random.default_rng(0), Appearance.unknown()
+    rng, appearance = np.random.default_rng(0), PersonAppearance.unknown()
     shirt = normalised(np.array([[SHIRTS[0]]], np.uint8)).reshape(1, 3).repeat(SAMPLES, 0)
     for part in range(len(PARTS)):
         appearance = appearance.learned(part, shirt, 0.0, rng)
@@ -408,7 +408,7 @@ def test_a_lens_bends_the_raster_not_the_people() -> None:
     seen = colour_views(FrameObservations([painted(camera, standing)], [silhouette]), "particles", 0)[0]
     assert seen is not None
     frame, axes = (
-        view.prepare(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], np.array([0.3])),
+        view.prepare(seen, standing[:, :2], standing[:, 2], [PersonAppearance.unknown()], np.array([0.3])),
         np.zeros((1, 4)),
     )
     frame.fill_axes(standing[:, :2], True, axes)

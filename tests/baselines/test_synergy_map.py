@@ -18,7 +18,7 @@ from stseg.config import OccupancyConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
-from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, fill_sums, sum_of
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, fill_summed_area, sum_of
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 from stseg.occupancy.volume import Occupancy
 from stseg.records.people import Explanation
@@ -55,7 +55,7 @@ def test_means_over_footprints_by_definition(width: int, height: int, seed: int)
     boxes = box_rows(rng, width, height, 6)
     footprint = np.array([*boxes, [0, 0, 0, 0]], np.int16).reshape(1, 1, -1, 4)
     sums, levels = np.empty((height + 1, width + 1), np.uint32), np.empty((1, 1, 7), np.int16)
-    fill_sums(likelihood, 0, 0, sums)
+    fill_summed_area(likelihood, 0, 0, sums)
     fill_means(sums, footprint, 0, 0, levels)
     assert levels[0, 0, -1] == UNSEEN
     for box, level in zip(boxes, levels[0, 0], strict=False):

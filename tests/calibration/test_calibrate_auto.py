@@ -25,8 +25,8 @@ from stseg.calibration.automatic.auto import (
 from stseg.calibration.automatic.correspondence import match_endpoints
 from stseg.calibration.automatic.endpoints import Endpoints, path_of, upright_endpoints
 from stseg.calibration.automatic.single_view import view_of_upright
-from stseg.calibration.automatic.solution import SolvedViews, refine
-from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored
+from stseg.calibration.automatic.solution import SolvedViews, refine_cameras
+from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored_paths
 from stseg.calibration.bundle_adjustment import residuals
 from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto
@@ -132,7 +132,7 @@ def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> N
     best = align(a, b, 5.0, 10)[0]
     assert best.delay == delay and best.support > 0.9 * len(a.frame)
     assert abs(best.factor - np.exp(1j * turn)) < 0.02 and abs(best.shift - (2 - 1j)) < 0.05
-    assert align(a, mirrored(b), 5.0, 10)[0].support < 0.6 * best.support
+    assert align(a, mirrored_paths(b), 5.0, 10)[0].support < 0.6 * best.support
 
 
 def test_meetings_join_one_row_a_view_and_follow_people() -> None:
@@ -223,7 +223,7 @@ def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: SolvedView
 
 def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: SolvedViews) -> None:
     wrong = solution.delay + np.array([0, 0, 1])
-    again = refine(scene.views, solution.adjustment.parameters.views.copy(), wrong, lambda: None)
+    again = refine_cameras(scene.views, solution.adjustment.parameters.views.copy(), wrong, lambda: None)
     assert (again.delay - again.delay[0]).tolist() == DELAYS
 
 
@@ -261,7 +261,7 @@ def test_another_time_is_named(scene: Walking) -> None:
 
 def test_a_mirrored_view_is_named(scene: Walking) -> None:
     paths = true_walks(scene)
-    paths[1] = mirrored(paths[1])
+    paths[1] = mirrored_paths(paths[1])
     refused(SourceError, r"^b: .* mirror", judge, paths)
 
 

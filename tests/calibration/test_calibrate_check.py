@@ -19,7 +19,7 @@ from stseg.arrays import Boxes, Floats
 from stseg.calibration.check.blunders import match_frames
 from stseg.calibration.check.box_correspondence import isolated_boxes, tables_of
 from stseg.calibration.check.leave_one_out import locate
-from stseg.calibration.check.rig_check import Check, check_rig, coverage, verdict_text
+from stseg.calibration.check.rig_check import Check, cell_coverage, check_rig, verdict_text
 from stseg.calibration.points.point_fit import Points, fit_points
 from stseg.commands.calibrate.app import app
 from stseg.errors import ConfigError, OutputError
@@ -147,10 +147,10 @@ class TestBlunders:
 
 
 def test_coverage_counts_views() -> None:
-    has_box = coverage(RIG)
+    has_box = cell_coverage(RIG)
     assert has_box.shape == RIG.grid.shape and has_box.max() == 4
     camera = RIG.cameras[0]
-    alone = coverage(replace(RIG, cameras=(camera,)))
+    alone = cell_coverage(replace(RIG, cameras=(camera,)))
     pixel, ahead = camera.project(RIG.grid.ground[10, 20], 0.0)
     assert alone[0, 10, 20] == int(ahead and camera.inside(pixel))
 

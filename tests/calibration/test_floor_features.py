@@ -12,7 +12,13 @@ from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import cameras_of
 from stseg.calibration.automatic.auto import align_all, merge_views, placed_views
 from stseg.calibration.automatic.floor_features import Marks, floor_marks
-from stseg.calibration.automatic.solution import SolvedViews, refine, refine_with_marks, single_view_cameras, view_paths
+from stseg.calibration.automatic.solution import (
+    SolvedViews,
+    refine_cameras,
+    refine_with_marks,
+    single_view_cameras,
+    view_paths,
+)
 from stseg.calibration.pinhole import CENTRE
 from stseg.geometry import Camera, Grid
 from stseg.simulation import SceneSpec
@@ -59,7 +65,7 @@ def test_marks_bring_cameras_nearer_to_the_truth() -> None:
     single_cameras = single_view_cameras(scene.views, lambda: None)
     paths = view_paths(scene.views, single_cameras)
     merged = merge_views(paths, align_all(paths, 5.0, 0, lambda: None))
-    by_people = refine(scene.views, placed_views(single_cameras, merged), np.zeros(2, np.int64), lambda: None)
+    by_people = refine_cameras(scene.views, placed_views(single_cameras, merged), np.zeros(2, np.int64), lambda: None)
     true = exact_marks(scene)
     by_both = refine_with_marks(scene.views, by_people, true)
     assert disagreement(by_both, true) < 0.5 * disagreement(by_people, true)

@@ -33,10 +33,11 @@ from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
+from stseg.geometry.distances import distances
 from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
 from stseg.records.tables import Tracks
-from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.assignment import assign
 from stseg.tracking.filter.track_filter import TrackFilter
 
 KINDS = ("pixels", "boxes")

@@ -26,7 +26,8 @@ from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.merge_moves import merged
 from stseg.detection.search.refined_people import refined_members
 from stseg.detection.search.restarts import restarted
-from stseg.evaluation.sequence import distances, match
+from stseg.evaluation.sequence import match
+from stseg.geometry.distances import distances
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
 from stseg.records.predicted_tracks import PredictedTracks

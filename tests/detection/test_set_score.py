@@ -9,11 +9,21 @@ from crafted_frames import PARAMETERS, hiders_of_cover, in_rooms, random_frame, 
 from reference_core import best_pairs
 from scipy.optimize import linear_sum_assignment
 
-from stseg.bodies.outlines import paint
+from stseg.bodies.outlines import paint_outlines
 from stseg.detection.problem import BoxEvidence, PixelEvidence
 from stseg.detection.score.box_state import clear_cache
 from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_scores, pixel_score, set_score
-from stseg.detection.score.set_state import SetState, add, assign, changed, gain, put, release, set_state, withdraw
+from stseg.detection.score.set_state import (
+    SetState,
+    add,
+    assign_pixels_and_tracks,
+    changed,
+    gain,
+    put,
+    release,
+    set_state,
+    withdraw,
+)
 from stseg.detection.score.track_state import assign_track, track_gain, track_state
 
 
@@ -96,7 +106,7 @@ def test_painted_pixels_are_those_of_the_score(seed: int) -> None:
         pixel_score(view, members, 3, pixels, PARAMETERS, owner, parts)
         painted = np.full(pixels.raster[view].shape, -1, np.int16)
         farthest_first = np.argsort(pixels.distance[view][members], kind="stable")[::-1].copy()
-        paint(farthest_first, pixels.first[view][members], pixels.spans[view][members], painted)
+        paint_outlines(farthest_first, pixels.first[view][members], pixels.spans[view][members], painted)
         assert (painted >= 0).any()
         np.testing.assert_array_equal(painted.ravel(), owner)
 
@@ -121,7 +131,7 @@ def test_gains_are_differences_of_scores(seed: int, tracks: int) -> None:
     frame = scaled(in_rooms(random_frame(seed, 8, tracks), 4) if seed % 2 else random_frame(seed, 8, tracks))
     state, rng, cached = set_state(frame.problem()), np.random.default_rng(seed), 0
     clear_cache(state.boxes)
-    assign(state)
+    assign_pixels_and_tracks(state)
     for moved in rng.integers(0, 8, 14).tolist():
         cached += int(state.boxes.is_cached.sum())
         if state.inside[moved]:

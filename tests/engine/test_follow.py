@@ -30,7 +30,7 @@ from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.records.tables import CORRECTION, TRAJECTORY
-from stseg.trajectories.live_ids import LiveCorrections, LiveIds, corrected
+from stseg.trajectories.live_ids import LiveCorrections, LiveIds, corrected_ids
 
 PROGRAM = """
 import signal, sys
@@ -138,7 +138,7 @@ def test_ids_that_are_corrected_go_on_so_and_are_told(
     assert evaluate(walkers(FRAMES), messages).switches == 2
     told = CorrectionTable(output.with_name("run.h5.live_corrections.csv"), FRAMES).rows
     assert told["decision_frame"].tolist() == decided * 2
-    late = corrected(messages, told)
+    late = corrected_ids(messages, told)
     assert evaluate(walkers(FRAMES), late[late["frame"] >= 4]).switches == 0
     assert_same(output, live)
 

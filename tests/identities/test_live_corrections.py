@@ -22,7 +22,7 @@ from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.live.publishing import Publisher
 from stseg.records.border import Border
 from stseg.records.tables import APPEARANCE, CORRECTION, TRAJECTORY
-from stseg.trajectories.live_ids import LiveCorrections, corrected, renamed
+from stseg.trajectories.live_ids import LiveCorrections, corrected_ids, renamed
 
 RATE = 10.0
 NOTHING = np.zeros(0, APPEARANCE)
@@ -51,7 +51,7 @@ def in_windows(rows: Rows, config: Config, fresh: Callable[[], int]) -> Rows:
 def test_who_was_lost_and_found_gets_the_first_id_back() -> None:
     rows = np.concatenate([walk(1, 0, 45), walk(2, 52, 100), walk(3, 0, 100, 3.0)])
     found = in_windows(rows, Config(live=LiveConfig(correction_interval=2.0)), count(4).__next__)
-    named = corrected(rows, found)
+    named = corrected_ids(rows, found)
     assert set(named["id"][rows["y"] == 0.0].tolist()) == {1}
     assert set(named["id"][rows["y"] == 3.0].tolist()) == {3}
     assert found["decision_frame"].min() < 80
@@ -78,18 +78,18 @@ def test_no_id_stands_twice_in_a_frame(seed: int) -> None:
     rows = np.concatenate([walk(1 + k, 0, 60, float(y[k])) for k in range(4)])
     late = rows["frame"] >= int(rng.integers(20, 40))
     rows["id"][late] = rng.permutation(np.arange(1, 7))[rows["id"][late] - 1]
-    named = corrected(rows, in_windows(rows, Config(live=LiveConfig(correction_interval=2.0)), count(7).__next__))
+    named = corrected_ids(rows, in_windows(rows, Config(live=LiveConfig(correction_interval=2.0)), count(7).__next__))
     assert len(np.unique(np.stack([named["frame"], named["id"]]), axis=1).T) == len(named)
 
 
 def test_corrections_of_one_decision_hold_at_once() -> None:
     rows = np.concatenate([walk(1, 0, 60), walk(2, 0, 60, 1.0)])
-    exchanged = corrected(rows, EXCHANGE)
+    exchanged = corrected_ids(rows, EXCHANGE)
     within = (rows["frame"] >= 20) & (rows["frame"] <= 50)
     np.testing.assert_array_equal(exchanged["id"], np.where(within, 3 - rows["id"], rows["id"]))
     later = EXCHANGE.copy()
     later["decision_frame"] = 60
-    np.testing.assert_array_equal(corrected(rows, np.concatenate([EXCHANGE, later]))["id"], rows["id"])
+    np.testing.assert_array_equal(corrected_ids(rows, np.concatenate([EXCHANGE, later]))["id"], rows["id"])
 
 
 def test_ids_go_on_as_corrected_and_lost_tracks_leave_used_ones() -> None:

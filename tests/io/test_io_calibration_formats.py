@@ -23,7 +23,7 @@ from stseg.geometry import Camera
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.matrices import read_pom, read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
-from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, median_height, require_height
+from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, median_height, require_median_height
 from stseg.io.calibrations.xml_files import read_tsai_xml
 from stseg.io.recording.rigs import read_recording
 
@@ -301,7 +301,7 @@ class TestGuesses:
     @pytest.mark.parametrize(("given", "true", "hint"), [("m", 0.001, "mm"), ("mm", 1.0, "m"), ("m", 0.01, "cm")])
     def test_a_wrong_unit_is_named(self, given: str, true: float, hint: str) -> None:
         with pytest.raises(CalibrationError, match=rf"--unit {given}: .* are its lengths in {hint}\?"):
-            require_height(turned("+z", true), World(given))
+            require_median_height(turned("+z", true), World(given))
 
     def test_a_mirrored_world_is_named(self) -> None:
         mirror = np.diag([1.0, -1.0, 1.0, 1.0])

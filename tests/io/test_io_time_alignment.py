@@ -22,7 +22,13 @@ from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import read_recording, write_rig
-from stseg.io.recording.time_alignment import TimeAlignment, align_in_time, coverage, nearest_frames, with_alignment
+from stseg.io.recording.time_alignment import (
+    TimeAlignment,
+    align_in_time,
+    frame_coverage,
+    nearest_frames,
+    with_alignment,
+)
 from stseg.io.recording.video.time_stamps import concatenate_files, interpret_stamps
 from stseg.io.runfile.provenance import gather_provenance
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
@@ -244,7 +250,7 @@ def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None
     for count, offset, timed in cameras:
         frame_at_tick = np.where(rng.random(count) < 0.7, np.arange(count), -1) if timed else None
         sources.append(video(offset=offset, frame_at_tick=frame_at_tick))
-    flags = coverage(recording(*sources), [count for count, _, _ in cameras], length)
+    flags = frame_coverage(recording(*sources), [count for count, _, _ in cameras], length)
     for own, source, (count, offset, _) in zip(flags, sources, cameras, strict=True):
         for frame in range(length):
             tick = frame - offset
@@ -299,7 +305,7 @@ def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
         with open_frames(uneven, first, min(first + 2, 20), streams) as reader:
             assert [tuple(map(shown_number, frame_set.views)) for frame_set in reader] == views[first : first + 2]
     assert [shown_number(view) for view in read_camera(uneven, 1, [4, 6, 13], streams)] == [4, None, 10]
-    assert streams.coverage(uneven).sum(axis=1).tolist() == [20, 17, 19]
+    assert streams.frame_coverage(uneven).sum(axis=1).tolist() == [20, 17, 19]
 
 
 def test_cameras_that_end_apart_by_stamps_are_refused(tmp_path: Path) -> None:

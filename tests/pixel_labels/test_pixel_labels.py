@@ -18,8 +18,14 @@ from stseg.config import BodyConfig, LabelConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Camera
 from stseg.graphcut.grid_energy import QUANTUM
-from stseg.pixel_labels.appearance import SLICES, Appearance, BodyRows, ColourSums, colour_log_ratios
-from stseg.pixel_labels.label_likelihood import LabelLikelihood, Patches, PlacedPeople, pillar_patches, visible_shares
+from stseg.pixel_labels.appearance import SLICES, BodyRows, ColourSums, ViewAppearance, colour_log_ratios
+from stseg.pixel_labels.label_likelihood import (
+    LabelLikelihood,
+    PersonPatches,
+    PlacedPeople,
+    pillar_patches,
+    visible_shares,
+)
 from stseg.pixel_labels.pixel_energy import PixelEnergy, edge_costs, most_likely_labels, pixel_energy
 from stseg.pixel_labels.views import ViewLabels, view_labels
 
@@ -91,7 +97,7 @@ def test_the_product_is_the_mean_over_all_combinations_of_draws(seed: int, count
     drawn = [rng.random((3, 2, 3)) < 0.6 for _ in range(count)]
     distance = rng.random(count)
     cover = np.concatenate([own.mean(0).ravel() for own in drawn]).astype(np.float32)
-    patches = Patches(np.tile([4, 7, 7, 9], (count, 1)), np.arange(count + 1) * 6, cover)
+    patches = PersonPatches(np.tile([4, 7, 7, 9], (count, 1)), np.arange(count + 1) * 6, cover)
     shown = visible_shares(patches, distance)
     assert (shown.left, shown.top) == (4, 7)
     np.testing.assert_allclose(reference.dense(shown), reference.nearest_shares(drawn, distance), atol=1e-5)
@@ -135,7 +141,7 @@ def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int])
     edges = np.concatenate([edges, [[0, 0, columns, rows]]])[-count:] + np.tile([5, 2], 2)
     first = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
     share = rng.random(first[-1]).astype(np.float32)
-    return visible_shares(Patches(edges, first, share), rng.random(count))
+    return visible_shares(PersonPatches(edges, first, share), rng.random(count))
 
 
 def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikelihood, Singles, Bytes, LabelConfig]:
@@ -270,14 +276,14 @@ def two_rectangles(rng: np.random.Generator) -> tuple[LabelLikelihood, BodyRows,
     background = np.zeros((12, 5), np.float32)
     rows = BodyRows(np.array([2.0, 4.0]), np.array([14.0, 13.0]))
     image = rng.integers(0, 256, (12, 5, 3)).astype(np.uint8)
-    return LabelLikelihood(3, 2, background, Patches(edges, np.array([0, 36, 72]), share)), rows, image
+    return LabelLikelihood(3, 2, background, PersonPatches(edges, np.array([0, 36, 72]), share)), rows, image
 
 
 def slice_of(v: int, j: int, rows: BodyRows) -> int:
     return int(np.clip(SLICES * (v + 0.5 - rows.head[j]) / (rows.feet[j] - rows.head[j]), 0, SLICES - 1))
 
 
-def density(colour: Floats, t: int, s: int, worn: Appearance) -> float:
+def density(colour: Floats, t: int, s: int, worn: ViewAppearance) -> float:
     """p(c | j, s) / 256^-3."""
     off = colour - worn.mean[t, s]
     normal = worn.peak[t, s] * np.exp(-0.5 * off @ worn.precision[t, s] @ off)
@@ -342,7 +348,7 @@ def test_where_two_stand_in_one_another_the_colour_decides() -> None:
     colours = np.array([[200, 40, 40], [40, 40, 200]], np.uint8)
     mean = np.repeat(colours[:, None].astype(float), SLICES, 1)
     precision = np.tile(np.eye(3) / 100.0, (2, SLICES, 1, 1))
-    worn = Appearance(TRACKS, mean, precision, np.full((2, SLICES), (2 * np.pi * 100.0) ** -1.5))
+    worn = ViewAppearance(TRACKS, mean, precision, np.full((2, SLICES), (2 * np.pi * 100.0) ** -1.5))
     labels = view.label(placed, foreground, colours[truth], worn)
     inside = foreground > 0.5
     right = (labels == truth + 1)[inside].mean()

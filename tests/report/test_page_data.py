@@ -22,7 +22,7 @@ from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.records.ghost_reasons import ghost_reasons
 from stseg.records.tables import EVENT, TRAJECTORY, Tracks
 from stseg.reporting.page.answers import answers
-from stseg.reporting.page.embedded import Sheets, coarse, embedded_json, spread, thin_sheets, thin_tracks
+from stseg.reporting.page.embedded import Sheets, coarse, embedded_json, evenly_spaced, thin_sheets, thin_tracks
 from stseg.reporting.pictures.maps import DwellPlace
 from stseg.reporting.run_statistics import Span
 
@@ -80,7 +80,7 @@ def test_large_ground_is_shown_by_the_greatest_of_some_cells() -> None:
 @given(st.integers(1, 60), st.integers(2, 20))
 def test_spread_frames_reach_from_end_to_end(count: int, most: int) -> None:
     frames = np.arange(10, 10 + count)
-    chosen = spread(frames, most)
+    chosen = evenly_spaced(frames, most)
     assert len(chosen) == min(count, most) and len(np.unique(chosen)) == len(chosen)
     assert chosen[0] == frames[0] and chosen[-1] == frames[-1]
 

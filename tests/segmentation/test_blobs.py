@@ -15,7 +15,7 @@ from stseg.records.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_measures import BlobMeasures, fill_ground_labels, fill_measures
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_motion import motion_field
-from stseg.segmentation.patches import Patches
+from stseg.segmentation.patches import GroundPatches
 
 _FAINT = 1e-6
 
@@ -102,7 +102,9 @@ def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats |
     label = np.where(
         occupied, np.append(np.arange(len(ground)) + 11, UNASSIGNED)[nearest_person(GRID.ground, ground, 0.4)], 0
     )
-    return find_blobs(label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, Patches.whole(GRID))
+    return find_blobs(
+        label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, GroundPatches.whole(GRID)
+    )
 
 
 def test_a_person_is_a_blob() -> None:
@@ -164,7 +166,7 @@ def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
     label[1, 3, 3], label[1, 3, 8] = 4, 4
     label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
     found = find_blobs(
-        label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, Patches.whole(GRID)
+        label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, GroundPatches.whole(GRID)
     )
     assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED]
     assert found.person.tolist() == [-1, -1, -1]
@@ -177,7 +179,7 @@ def test_a_column_belongs_to_the_label_with_most_mass() -> None:
     for strength, whose in ((1.0, 2), (9.0, 1)):
         log_odds = np.ones(GRID.shape, np.float32)
         log_odds[3] = strength
-        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, Patches.whole(GRID))
+        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, GroundPatches.whole(GRID))
         assert found.track.tolist() == ([1] if whose == 1 else [2, 1])  # a detection without cells comes last
         assert found.person.tolist() == ([0] if whose == 1 else [-1, 0])
         assert found.mass[0] == pytest.approx(strength if whose == 1 else 1.0)
@@ -188,7 +190,7 @@ def test_a_blob_holds_the_detection_inside_it() -> None:
     label = disc((0.45, 0.75)).astype(np.int32) * 3
     for x, held in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
         found = find_blobs(
-            label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, Patches.whole(GRID)
+            label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, GroundPatches.whole(GRID)
         )
         assert found.person.tolist() == held
 
@@ -202,7 +204,7 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
     label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([UNASSIGNED, 1, 2, 3], GRID.shape), 0).astype(np.int32)
     log_odds = rng.normal(0, 2, GRID.shape).astype(np.float32)
     log_odds[rng.random(GRID.shape) < 0.1] = np.nan
-    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, Patches.whole(GRID))
+    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, GroundPatches.whole(GRID))
     number = int((found.extent > 0).sum())
     np.testing.assert_array_equal(found.cells > 0, (label != 0).any(0))
     assert np.unique(found.cells[found.cells > 0]).tolist() == list(range(1, number + 1))

@@ -12,7 +12,7 @@ from scenes import CONFIG, found, people, room
 from stseg.arrays import Floats
 from stseg.geometry import Grid
 from stseg.records.sparse_volume import SparseVolume
-from stseg.segmentation.patches import SIDE, Patches, mark_places, no_squares, people_squares
+from stseg.segmentation.patches import SIDE, GroundPatches, mark_places, no_squares, people_squares
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 
@@ -60,11 +60,11 @@ def test_patches_are_enough(weak: float, monkeypatch: pytest.MonkeyPatch) -> Non
     """Labels, tracks, energy and undecided cells of the windows are those of the whole ground."""
     cut_out = commits(weak)
 
-    def every(grid: Grid, squares: object) -> Patches:
+    def every(grid: Grid, squares: object) -> GroundPatches:
         del squares
-        return Patches.whole(grid)
+        return GroundPatches.whole(grid)
 
-    monkeypatch.setattr(Patches, "of", every)
+    monkeypatch.setattr(GroundPatches, "of", every)
     whole = commits(weak)
     assert sum(len(commit.trajectory) for commit in whole) > 3 * FRAMES
     for one, other in zip(cut_out, whole, strict=True):
@@ -80,7 +80,7 @@ def test_patches_are_apart_and_hold_what_is_marked() -> None:
         squares = no_squares(GRID)
         places = rng.integers(0, GRID.shape[1] * GRID.shape[2], 6)
         mark_places(squares, places, GRID)
-        patches = Patches.of(GRID, squares)
+        patches = GroundPatches.of(GRID, squares)
         inside = patches.place >= 0
         held = np.bincount(patches.place[inside], minlength=GRID.shape[1] * GRID.shape[2])
         assert held.max() == 1
@@ -97,9 +97,9 @@ def test_patches_are_apart_and_hold_what_is_marked() -> None:
 
 def test_the_way_to_the_next_frame_is_one_patch() -> None:
     here, ahead = np.array([[-4.0, -4.0], [9.0, 9.0]]), np.array([[4.0, 3.0], [9.0, 9.0]])
-    patches = Patches.of(GRID, people_squares(GRID, here, ahead, 0.4))
+    patches = GroundPatches.of(GRID, people_squares(GRID, here, ahead, 0.4))
     assert len(patches.rectangles) == 1
-    assert Patches.of(GRID, no_squares(GRID)).place.tolist() == [[-1]]
+    assert GroundPatches.of(GRID, no_squares(GRID)).place.tolist() == [[-1]]
 
 
 def test_log_odds_on_the_sheet() -> None:
@@ -110,7 +110,7 @@ def test_log_odds_on_the_sheet() -> None:
     assert set(volume.occupied_places().tolist()) == set(np.flatnonzero((dense > 0).any(0)).tolist())
     squares = no_squares(GRID)
     mark_places(squares, np.array([77, 6000]), GRID)
-    patches = Patches.of(GRID, squares)
+    patches = GroundPatches.of(GRID, squares)
     sheet, inside = patches.log_odds(volume), patches.place >= 0
     np.testing.assert_array_equal(sheet[:, inside], dense.reshape(3, -1)[:, patches.place[inside]])
     assert (sheet[:, ~inside] < -20).all()

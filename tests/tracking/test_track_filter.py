@@ -14,7 +14,7 @@ from scenes import CONFIG, found, people
 from strategies import numbers
 
 from stseg.arrays import Floats
-from stseg.baselines.huang_wang_2012.kalman_filters import corrected, initial, innovations, predicted
+from stseg.baselines.huang_wang_2012.kalman_filters import corrected_filters, initial, innovations, predicted_filters
 from stseg.config import MotionConfig
 from stseg.identities.search.hypotheses import correct_place, predicted_variance
 from stseg.records.people import People
@@ -324,9 +324,9 @@ def of_track_states(measured: Floats, noise: Floats) -> list[float]:
 def of_the_kalman_tracker(measured: Floats, noise: Floats) -> list[float]:
     filters, found = initial(measured[:1], noise[None], MOTION.speed_spread), []
     for place in measured[1:]:
-        filters = predicted(filters, SECONDS, MOTION)
+        filters = predicted_filters(filters, SECONDS, MOTION)
         found.append(float(innovations(filters, place[None], noise[None])[0][0, 0]))
-        filters = corrected(filters, np.zeros(1, np.int64), place[None], noise[None])
+        filters = corrected_filters(filters, np.zeros(1, np.int64), place[None], noise[None])
     return found
 
 

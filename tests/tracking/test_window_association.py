@@ -17,12 +17,13 @@ from stseg.arrays import Flags, Rows
 from stseg.bodies.pillars import BodyTable
 from stseg.config import TrackingConfig
 from stseg.geometry import Grid
+from stseg.geometry.distances import distances
 from stseg.geometry.nearest_person import nearest_person
 from stseg.records.blobs import UNASSIGNED, Blobs
 from stseg.records.tables import TRAJECTORY
 from stseg.segmentation.blobs import find_blobs
-from stseg.segmentation.patches import Patches
-from stseg.tracking.filter.assignment import assign, distances
+from stseg.segmentation.patches import GroundPatches
+from stseg.tracking.filter.assignment import assign
 from stseg.tracking.windows.tracklets import Tracklet, form_tracklets
 from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
 from stseg.tracking.windows.windows import LONGEST, SHORTEST, Window, window_length, windows
@@ -129,7 +130,7 @@ def blobs_in(
     owner = np.append(names, UNASSIGNED)[nearest_person(GRID.ground, held, 0.4)]
     label = np.where(occupied, owner, 0).astype(np.int32)
     log_odds = np.where(occupied, 2.0, -2.0).astype(np.float32)
-    return find_blobs(label, log_odds, held, names, 0.4, Patches.whole(GRID))
+    return find_blobs(label, log_odds, held, names, 0.4, GroundPatches.whole(GRID))
 
 
 def tracklets_of(
@@ -169,7 +170,7 @@ def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
     for owner, bridged in ((1, True), (UNASSIGNED, True), (2, False)):
         label = np.where(column([path[45]]), owner, 0).astype(np.int32)
         no_people = np.zeros((0, 2)), np.zeros(0, np.int64)
-        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *no_people, 0.4, Patches.whole(GRID))
+        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *no_people, 0.4, GroundPatches.whole(GRID))
         (one,) = form_tracklets(blobs, FRAMES[0], CONFIG)
         assert (45 in one.frames) == bridged
 

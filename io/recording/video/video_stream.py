@@ -8,7 +8,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.recording.pictures import as_observation, reduced_view
+from stseg.io.recording.pictures import picture_observation, reduced_view
 from stseg.io.recording.recording import Source
 from stseg.io.recording.video.ffmpeg import open_video
 from stseg.io.recording.video.packets import (
@@ -88,7 +88,7 @@ class VideoStream:
         key = f"camera {self._camera.name}, frame {self._frame}"
         if not decoded:
             raise SourceError(self._source.path, key, "a broken frame", "one that decodes")
-        whole = as_observation(picture, self._source.kind, self._camera.size, self._source.path, key)
+        whole = picture_observation(picture, self._source.kind, self._camera.size, self._source.path, key)
         return np.asarray(reduced_view(whole, self._factor))
 
     def close(self) -> None:

@@ -48,7 +48,7 @@ def format_errors(path: Path, place: str) -> Iterator[None]:
         raise FormatError(path, place, found, "a whole run file") from error
 
 
-def read_text(dataset: h5py.Dataset) -> str:
+def dataset_text(dataset: h5py.Dataset) -> str:
     """A single text, with bytes that are no UTF-8 escaped; ValueError where it is none."""
     with bounded_growth(_GROWTH):
         text = dataset.asstr(errors="surrogateescape")[()]
@@ -57,7 +57,7 @@ def read_text(dataset: h5py.Dataset) -> str:
     return text
 
 
-def read_texts(dataset: h5py.Dataset) -> AnyArray:
+def dataset_texts(dataset: h5py.Dataset) -> AnyArray:
     """Texts, str objects in the dataset's shape; raises what h5py raises where it holds others."""
     with bounded_growth(_GROWTH):
         return dataset.asstr()[()]  # type: ignore[no-any-return]

@@ -22,7 +22,7 @@ from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, PackedFrames
 from stseg.io.runfile.provenance import Provenance, read_provenance
 from stseg.io.runfile.reading.checks import Bounds, LayoutChecks, require_bounded_volume, require_fit, require_table
-from stseg.io.runfile.reading.hdf5_reading import format_errors, read_attribute, read_object, read_texts
+from stseg.io.runfile.reading.hdf5_reading import dataset_texts, format_errors, read_attribute, read_object
 from stseg.io.runfile.reading.run_arrays import RunVolume, to_data_frame
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.safe_hdf5 import open_hdf5, read_whole
@@ -39,7 +39,7 @@ _FRAMES = 48
 """Frames that the curve is learned from, spread over the run: they hold some 10^5 cells in doubt."""
 
 
-class _Table(cached_property[Rows]):
+class _TableProperty(cached_property[Rows]):
     """A table of a run file by the attribute's name, read and checked on its first use."""
 
     def __init__(self, about: str) -> None:
@@ -97,20 +97,20 @@ class Run:
         frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"
         return f"Run({str(self.path)!r}: {self.scene}, {frames}, {len(self.cameras)} cameras)"
 
-    trajectory = _Table("TRAJECTORY (n,).")
-    tracks = _Table("TRACK (n,).")
-    boxes = _Table("BOX (n,).")
-    events = _Table("EVENT (n,).")
-    ghosts = _Table("CANDIDATE (n,) with `parts`, float32 (views,).")
-    windows = _Table("WINDOW (n,).")
-    rates = _Table("RATES (n,).")
-    shifts = _Table("SHIFT (n,).")
-    timings = _Table("TIMING (n,).")
-    committed = _Table("TRAJECTORY (n,) before identities were decided, ids of the filter.")
-    committed_events = _Table("EVENT (n,) before identities were decided.")
-    appearance = _Table("APPEARANCE (n,).")
-    answers = _Table("ANSWER (n,): answers so far (`stseg correct`).")
-    known_people = _Table("KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`).")
+    trajectory = _TableProperty("TRAJECTORY (n,).")
+    tracks = _TableProperty("TRACK (n,).")
+    boxes = _TableProperty("BOX (n,).")
+    events = _TableProperty("EVENT (n,).")
+    ghosts = _TableProperty("CANDIDATE (n,) with `parts`, float32 (views,).")
+    windows = _TableProperty("WINDOW (n,).")
+    rates = _TableProperty("RATES (n,).")
+    shifts = _TableProperty("SHIFT (n,).")
+    timings = _TableProperty("TIMING (n,).")
+    committed = _TableProperty("TRAJECTORY (n,) before identities were decided, ids of the filter.")
+    committed_events = _TableProperty("EVENT (n,) before identities were decided.")
+    appearance = _TableProperty("APPEARANCE (n,).")
+    answers = _TableProperty("ANSWER (n,): answers so far (`stseg correct`).")
+    known_people = _TableProperty("KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`).")
 
     @cached_property
     def names(self) -> dict[int, str]:
@@ -266,7 +266,7 @@ def read_trajectory(path: Path) -> Rows:
 def _names(group: h5py.Group) -> dict[int, str]:
     if "names" not in group:
         return {}
-    pairs = (text.partition(",") for text in read_texts(group["names"]))
+    pairs = (text.partition(",") for text in dataset_texts(group["names"]))
     names = {parse_whole(identity, 1, limits.FRAMES): name for identity, _, name in pairs}
     if None in names or not all(map(is_title, names.values())):
         raise ValueError(f"names of tracks other than id,name with {EXPECTED_TITLE}")
@@ -294,7 +294,7 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
     kept = read_attribute(group, "kept") if "kept" in group.attrs else layout.VOLUMES[0]
     if kept not in layout.VOLUMES:
         raise FormatError(path, f"{layout.OCCUPANCY}@kept", abbreviated(kept), f"one of {', '.join(layout.VOLUMES)}")
-    title = printable(str(read_texts(entry)))[: limits.NAME]
+    title = printable(str(dataset_texts(entry)))[: limits.NAME]
     return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))
 
 

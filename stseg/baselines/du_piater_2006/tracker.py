@@ -15,13 +15,14 @@ from stseg.baselines.du_piater_2006.target import Target, in_front, target_likel
 from stseg.baselines.du_piater_2006.view import StarView
 from stseg.config import Config
 from stseg.geometry import Rig
+from stseg.geometry.distances import distances
 from stseg.records.border import Border
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces
-from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.assignment import assign
 from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS, EXISTENCE_DECAY
 
 _METHODS = {"messages": propagate, "condensation": condense}

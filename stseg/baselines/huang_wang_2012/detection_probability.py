@@ -25,7 +25,7 @@ from stseg.config import BodyConfig, ProposalConfig
 from stseg.errors import SourceError
 from stseg.geometry import Rig
 from stseg.geometry.grid import inside_polygon
-from stseg.geometry.summed_area import TOP_LEVEL, Sums, fill_sums, sum_of
+from stseg.geometry.summed_area import TOP_LEVEL, SummedArea, fill_summed_area, sum_of
 from stseg.kernels.accelerate import kernel
 
 _WITHIN = 2.0
@@ -95,7 +95,7 @@ class DetectionProbability:
     def chance(self, pillars: Pillars, soft_map: Singles) -> Floats:
         """p(F_i | X) of one view (eq. 6), float64 (place,); nan where it does not see the pillar."""
         sums = np.empty((soft_map.shape[0] + 1, soft_map.shape[1] + 1), np.uint32)
-        fill_sums(soft_map, 0, 0, sums)
+        fill_summed_area(soft_map, 0, 0, sums)
         chance = np.empty(len(pillars.edge))
         fill_chance(
             sums, pillars.upright, pillars.edge, pillars.middle, pillars.half, pillars.base, self.widths,
@@ -128,7 +128,7 @@ def _lattice(mean: float, spread: float, number: int) -> tuple[Floats, Floats]:
 
 @kernel
 def fill_chance(
-    sums: Sums,
+    sums: SummedArea,
     upright: Flags,
     edge: Singles,
     middle: Singles,

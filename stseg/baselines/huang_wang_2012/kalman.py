@@ -12,7 +12,13 @@ from typing import ClassVar
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.baselines.huang_wang_2012.kalman_filters import Filters, corrected, initial, innovations, predicted
+from stseg.baselines.huang_wang_2012.kalman_filters import (
+    Filters,
+    corrected_filters,
+    initial,
+    innovations,
+    predicted_filters,
+)
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.records.predicted_tracks import PredictedTracks
@@ -42,7 +48,7 @@ class KalmanTracker(FramewiseTracker):
         if not self.begun:
             return None
         seconds, noise = (frame - self.frame) / self.rig.frame_rate, self.config.motion.position_noise**2 * np.eye(2)
-        filters = predicted(self.filters, seconds, self.config.motion)
+        filters = predicted_filters(self.filters, seconds, self.config.motion)
         unseen = (frame - 1 - self.last_seen) / self.rig.frame_rate
         return PredictedTracks(
             filters.state[:, :2],
@@ -57,11 +63,11 @@ class KalmanTracker(FramewiseTracker):
         deaths = self._end(fused.frame)
         ground, model = fused.people.ground, self.config.motion
         noise = fused.people.covariance + np.eye(2) * model.position_noise**2
-        filters = predicted(self.filters, (fused.frame - self.frame) / self.rig.frame_rate, model)
+        filters = predicted_filters(self.filters, (fused.frame - self.frame) / self.rig.frame_rate, model)
         sizes = self._measured(fused.people.sizes)
         tracks, found = self._assigned(filters, ground, noise, sizes)
         unassigned = np.setdiff1d(np.arange(len(ground)), found)
-        filters = corrected(filters, tracks, ground[found], noise[found])
+        filters = corrected_filters(filters, tracks, ground[found], noise[found])
         self.filters = filters.joined_with(initial(ground[unassigned], noise[unassigned], model.speed_spread))
         self.sizes.put(tracks, sizes.at(found).with_prior(self.sizes.at(tracks)))
         population = Sizes.of_population(len(unassigned), self.config.body)

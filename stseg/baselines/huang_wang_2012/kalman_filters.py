@@ -53,7 +53,7 @@ def initial(ground: Floats, noise: Floats, pace: float) -> Filters:
     return Filters(np.concatenate([ground, np.zeros_like(ground)], 1), covariance)
 
 
-def predicted(filters: Filters, seconds: float, model: MotionConfig) -> Filters:
+def predicted_filters(filters: Filters, seconds: float, model: MotionConfig) -> Filters:
     """Prediction over some seconds."""
     motion = transition(seconds)
     state, covariance = filters.state @ motion.T, motion @ filters.covariance @ motion.T
@@ -75,7 +75,7 @@ def innovations(filters: Filters, ground: Floats, noise: Floats) -> tuple[Floats
     return squares, squares + np.log(np.linalg.det(innovation))
 
 
-def corrected(filters: Filters, which: Ints, ground: Floats, noise: Floats) -> Filters:
+def corrected_filters(filters: Filters, which: Ints, ground: Floats, noise: Floats) -> Filters:
     """Filters of which some (k,) are corrected by places (k, 2) with covariances (k, 2, 2), metres."""
     state, covariance = filters.state.copy(), filters.covariance.copy()
     before = covariance[which]

@@ -100,10 +100,10 @@ def soft_maps(probability: DetectionProbability, evidence: Sequence[ViewEvidence
 def probability_modes(probability: DetectionProbability, maps: Sequence[Singles | None]) -> Modes:
     """Modes of the detection probability where its log-ratio is above 0 (HW12 eqs 7 to 9)."""
     log_ratio = probability.log_ratio(maps)
-    return modes(weights(log_ratio), probability.ground, probability.spacing, probability.config.kernel_radius)
+    return modes(sample_weights(log_ratio), probability.ground, probability.spacing, probability.config.kernel_radius)
 
 
-def weights(log_ratio: Floats) -> Floats:
+def sample_weights(log_ratio: Floats) -> Floats:
     """G of the samples, from its logarithm (y, x), nats: 0 where that is not above 0."""
     return np.where(log_ratio > 0, np.exp(np.minimum(log_ratio, _LOG_RATIO_LIMIT)), 0.0)
 

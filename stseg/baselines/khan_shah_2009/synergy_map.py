@@ -15,7 +15,7 @@ from stseg.errors import SourceError
 from stseg.geometry import Rig
 from stseg.geometry.sampling import Footprints, Sampling, SamplingKind
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels, SumTable, sum_of
-from stseg.geometry.summed_area import Sums as AreaSums
+from stseg.geometry.summed_area import SummedArea as AreaSums
 from stseg.kernels.accelerate import kernel
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms

@@ -17,7 +17,7 @@ _FEWEST = 20
 
 
 @dataclass(frozen=True)
-class Appearance:
+class PersonAppearance:
     """The colours of one person.
 
     Attributes
@@ -35,7 +35,7 @@ class Appearance:
     reference: Floats
 
     @classmethod
-    def unknown(cls) -> Appearance:
+    def unknown(cls) -> PersonAppearance:
         """Model without samples."""
         parts = len(PARTS)
         empty = histogram(np.zeros((0, 3), np.uint8))
@@ -46,7 +46,7 @@ class Appearance:
         """Number of usable samples of each part, int64 (part,); 0 for a part without a model."""
         return np.where(self.counts >= _FEWEST, self.counts, 0)
 
-    def learned(self, part: int, colour: Bytes, share: float, rng: np.random.Generator) -> Appearance:
+    def learned(self, part: int, colour: Bytes, share: float, rng: np.random.Generator) -> PersonAppearance:
         """With new colours, uint8 (n, 3), of a part: they fill the buffer, and replace a share of a full one."""
         samples, counts, reference = self.samples.copy(), self.counts.copy(), self.reference.copy()
         room = SAMPLES - int(counts[part])
@@ -56,4 +56,4 @@ class Appearance:
         samples[part, where] = drawn
         counts[part] += len(drawn) if room else 0
         reference[part] = histogram(samples[part, : counts[part]] if counts[part] >= _FEWEST else drawn[:0])
-        return Appearance(samples, counts, reference)
+        return PersonAppearance(samples, counts, reference)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.baselines.kim_davis_2006.appearance import Appearance
+from stseg.baselines.kim_davis_2006.appearance import PersonAppearance
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Crowd:
     ground: Floats
     covariance: Floats
     particles: Floats
-    appearances: tuple[Appearance, ...]
+    appearances: tuple[PersonAppearance, ...]
 
     @classmethod
     def empty(cls, particles: int) -> Crowd:
@@ -48,7 +48,7 @@ class Crowd:
     @property
     def reference(self) -> Floats:
         """q* of every person, float64 (n, part, bin)."""
-        none = np.zeros((0, *Appearance.unknown().reference.shape))
+        none = np.zeros((0, *PersonAppearance.unknown().reference.shape))
         return np.concatenate([none, *(one.reference[None] for one in self.appearances)])
 
     def kept(self, which: Flags) -> Crowd:

@@ -10,12 +10,12 @@ import numpy as np
 from stseg.arrays import Floats
 
 
-def predicted(particles: Floats, spread: float, rng: np.random.Generator) -> Floats:
+def predicted_particles(particles: Floats, spread: float, rng: np.random.Generator) -> Floats:
     """A step of a random walk with a standard deviation of `spread`, metres."""
     return particles + rng.normal(0.0, spread, particles.shape)
 
 
-def weights(misfit: Floats, sharpness: float) -> Floats:
+def particle_weights(misfit: Floats, sharpness: float) -> Floats:
     """Eq. 7: the weight of each particle by its sum of d^2, float64 (particle,), with lambda; they sum to 1."""
     raw = np.exp(-sharpness * (misfit - misfit.min()))
     return np.asarray(raw / raw.sum())

@@ -16,20 +16,21 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.baselines.colour_views import ColourView, colour_views
-from stseg.baselines.kim_davis_2006.appearance import Appearance
+from stseg.baselines.kim_davis_2006.appearance import PersonAppearance
 from stseg.baselines.kim_davis_2006.crowd import Crowd
-from stseg.baselines.kim_davis_2006.filter import estimate, predicted, resampled, weights
+from stseg.baselines.kim_davis_2006.filter import estimate, particle_weights, predicted_particles, resampled
 from stseg.baselines.kim_davis_2006.search import search
 from stseg.baselines.kim_davis_2006.views import ParticleFrame, ParticleView
 from stseg.config import Config
 from stseg.geometry import Rig
+from stseg.geometry.distances import distances
 from stseg.records.border import Border
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces
-from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.assignment import assign
 from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS, EXISTENCE_DECAY
 
 _FLOOR = 0.05
@@ -139,7 +140,7 @@ class ParticleTracker(FramewiseTracker):
     def _follow(self, frames: Sequence[ParticleFrame], step: float) -> None:
         """Propagate, weight and resample the particles."""
         config, crowd = self.config.particles, self.crowd
-        moved = crowd.particles if config.method == "search" else predicted(crowd.particles, step, self.rng)
+        moved = crowd.particles if config.method == "search" else predicted_particles(crowd.particles, step, self.rng)
         if config.method != "generic":
             median = config.axis_fit == "median"
             moved = np.stack([search(frames, hypothesis, config.iterations, median) for hypothesis in moved])
@@ -147,7 +148,7 @@ class ParticleTracker(FramewiseTracker):
         for hypothesis, row in zip(moved, misfit, strict=True):
             for frame in frames:
                 frame.add_misfit(hypothesis, reference, row)
-        weight = weights(misfit.sum(1), config.colour_weight)
+        weight = particle_weights(misfit.sum(1), config.colour_weight)
         ground, covariance = estimate(moved, weight)
         drawn = resampled(moved, weight, self.rng)
         covariance = covariance + _FLOOR**2 * np.eye(2)
@@ -170,8 +171,8 @@ class ParticleTracker(FramewiseTracker):
         ids = self.issued + 1 + np.arange(count)
         self.issued += count
         places = people.ground[unassigned]
-        particles = predicted(np.repeat(places[None], len(self.crowd.particles), 0), _FLOOR, self.rng)
-        unknown = (Appearance.unknown(),) * count
+        particles = predicted_particles(np.repeat(places[None], len(self.crowd.particles), 0), _FLOOR, self.rng)
+        unknown = (PersonAppearance.unknown(),) * count
         self.crowd = self.crowd.joined_with(
             Crowd(
                 ids, np.full(count, fused.frame), people.height[unassigned], places, people.covariance[unassigned],

@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
 from stseg.baselines.colour_views import ColourView
-from stseg.baselines.kim_davis_2006.appearance import Appearance
+from stseg.baselines.kim_davis_2006.appearance import PersonAppearance
 from stseg.baselines.kim_davis_2006.axes import fill_axes
 from stseg.baselines.kim_davis_2006.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
 from stseg.baselines.kim_davis_2006.colours import FALL, bins_of, fill_density, normalised
@@ -62,7 +62,7 @@ class ParticleView:
         return bodies
 
     def prepare(
-        self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[Appearance], margin: Floats
+        self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[PersonAppearance], margin: Floats
     ) -> ParticleFrame:
         """Prepare a frame for a search within margins (n,), metres, of places (n, 2)."""
         colour = normalised(view.image[:: self.step, :: self.step])
@@ -128,8 +128,8 @@ class ParticleFrame:
         )  # fmt: skip
 
     def learned(
-        self, ground: Floats, appearances: Sequence[Appearance], share: float, rng: np.random.Generator
-    ) -> list[Appearance]:
+        self, ground: Floats, appearances: Sequence[PersonAppearance], share: float, rng: np.random.Generator
+    ) -> list[PersonAppearance]:
         """Update colour models of people at places (n, 2) from their visible pixels in this view.
 
         Occluded people are not updated; a part that has a model is updated only from pixels segmented as the person.

@@ -19,12 +19,12 @@ from stseg.calibration.automatic.solution import (
     ROUNDS,
     CalibrationInput,
     SolvedViews,
-    refine,
+    refine_cameras,
     refine_with_marks,
     single_view_cameras,
     view_paths,
 )
-from stseg.calibration.automatic.view_alignment import IDENTITY, Alignment, ViewPaths, align, mirrored, support
+from stseg.calibration.automatic.view_alignment import IDENTITY, Alignment, ViewPaths, align, mirrored_paths, support
 from stseg.calibration.pinhole import moved
 from stseg.errors import SourceError
 
@@ -146,7 +146,7 @@ def calibrate_from_people(names: Sequence[str], views: CalibrationInput, progres
     merged = merge_views(paths, align_all(paths, views.frame_rate, most, progress))
     require_merged(names, paths, merged, views.frame_rate, most)
     delay = np.array([merged.placed[k].delay for k in range(len(names))], np.int64)
-    solution = refine(views, placed_views(single_cameras, merged), delay, progress)
+    solution = refine_cameras(views, placed_views(single_cameras, merged), delay, progress)
     require_correspondences(names, solution)
     return centred(solution)
 
@@ -228,7 +228,7 @@ def _mirror(view: int, paths: Sequence[ViewPaths], merged: MergedViews, rate: fl
     """The view that agrees far better with the mirror image of this one, or None."""
     for other in np.argsort(-merged.support[view]):
         if other != view:
-            found = align(paths[int(other)], mirrored(paths[view]), rate, most)
+            found = align(paths[int(other)], mirrored_paths(paths[view]), rate, most)
             if found and found[0].support > 1.5 * merged.support[view].max():
                 return int(other)
     return None

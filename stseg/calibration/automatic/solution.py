@@ -83,7 +83,7 @@ def view_paths(views: CalibrationInput, single_cameras: Sequence[Floats]) -> lis
     return paths
 
 
-def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> SolvedViews:
+def refine_cameras(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> SolvedViews:
     """Alternate correspondence and bundle adjustment, with shrinking gates.
 
     Parameters

@@ -91,7 +91,7 @@ def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> lis
     return sorted(best, key=lambda one: -one.support)
 
 
-def mirrored(paths: ViewPaths) -> ViewPaths:
+def mirrored_paths(paths: ViewPaths) -> ViewPaths:
     """The paths mirrored."""
     return ViewPaths(paths.frame, np.conj(paths.place), paths.path)
 

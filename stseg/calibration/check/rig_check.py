@@ -63,7 +63,7 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
     boxes_by_frame
         Boxes of every view in consecutive frames, see `isolated_boxes`.
     """
-    tables, frames = tables_of(rig), spread(sorted(boxes_by_frame))
+    tables, frames = tables_of(rig), checked_frames(sorted(boxes_by_frame))
     people = match_frames(rig, tables, boxes_by_frame, frames)
     share = confirmations(tables, people)
     lost: tuple[int, ...] = ()
@@ -89,8 +89,8 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
     return Check(verdict, tuple(share.tolist()), lost, None, tuple(shifted), len(people))
 
 
-def spread(frames: Sequence[int]) -> list[int]:
-    """At most `_MOST` frames, evenly spread."""
+def checked_frames(frames: Sequence[int]) -> list[int]:
+    """At most `_MAX_FRAMES` of the frames, evenly spread."""
     if len(frames) <= _MAX_FRAMES:
         return list(frames)
     return [frames[k] for k in np.rint(np.linspace(0, len(frames) - 1, _MAX_FRAMES)).astype(int)]
@@ -161,7 +161,7 @@ def disagreement_text(name: str, one: Disagreement) -> str:
     )
 
 
-def coverage(rig: Rig) -> Bytes:
+def cell_coverage(rig: Rig) -> Bytes:
     """Number of views that show each cell's centre, uint8 (plane, y, x)."""
     count = np.zeros(rig.grid.shape, np.uint8)
     for plane, height in enumerate(rig.grid.heights.tolist()):

@@ -57,7 +57,7 @@ def require_right_handed(name: str, ground: Floats, vertical: Floats) -> None:
     CalibrationError
     """
     if np.linalg.det(np.column_stack([ground[:, :2], vertical])) < 0:
-        raise mirrored(name)
+        raise mirrored_points_error(name)
 
 
 def require_upright(camera: Camera) -> None:
@@ -68,10 +68,10 @@ def require_upright(camera: Camera) -> None:
     CalibrationError
     """
     if camera.centre[2] <= 0:
-        raise mirrored(camera.name)
+        raise mirrored_points_error(camera.name)
 
 
-def mirrored(name: str) -> CalibrationError:
+def mirrored_points_error(name: str) -> CalibrationError:
     """The error of a camera with mirrored points."""
     return CalibrationError(
         f"camera {name}",
@@ -81,7 +81,7 @@ def mirrored(name: str) -> CalibrationError:
     )
 
 
-def require_height(camera: Camera, unit: str, metres: dict[str, float]) -> None:
+def require_camera_height(camera: Camera, unit: str, metres: dict[str, float]) -> None:
     """Refuse a unit that gives an implausible camera height where another unit gives a plausible one.
 
     Parameters

@@ -15,7 +15,7 @@ from stseg.geometry import Camera, Rig
 from stseg.geometry.rig import is_mirrored
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.formats import FORMATS, ImportOptions, help_text, read_cameras
-from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_height
+from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_median_height
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
@@ -131,7 +131,7 @@ def _file_names(files: Sequence[Path]) -> list[str]:
 def _world(cameras: Sequence[ForeignCamera], unit: str | None, up: Up | None, mirrored: bool) -> World:
     upward = up or guess_up(cameras)
     world = World(unit or guess_unit(cameras, upward, mirrored), upward, mirrored)
-    require_height(cameras, world)
+    require_median_height(cameras, world)
     return world
 
 

@@ -15,7 +15,7 @@ from stseg.arrays import Flags, Ints
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.box_state import BoxState, box_gain, box_state, clear_dependents
 from stseg.detection.score.scoring import pair_cost, set_score
-from stseg.detection.score.track_state import TrackState, assign_track, assign_tracks, track_gain, track_state
+from stseg.detection.score.track_state import TrackAssignment, assign_track, assign_tracks, track_gain, track_state
 from stseg.kernels.accelerate import kernel, part
 
 
@@ -23,7 +23,7 @@ class SetState(NamedTuple):
     """A set of candidates of a problem, to which members are added, and from which they are removed."""
 
     problem: DetectionProblem
-    """The candidates; its `owner` is the set's assignment of pixels between `assign` and `release`."""
+    """The candidates; `owner` is the set's assignment of pixels, from `assign_pixels_and_tracks` to `release`."""
     members: Ints
     """int64 (candidate + 1,): the first `size[0]` are the set."""
     size: Ints
@@ -32,7 +32,7 @@ class SetState(NamedTuple):
     """bool (candidate,): the set, and members of groups that do not interact with it."""
     boxes: BoxState
     """Links of candidates through boxes, and what is cached of the set."""
-    tracks: TrackState
+    tracks: TrackAssignment
     """The assignment of tracks to the set."""
 
 
@@ -53,7 +53,7 @@ def score(state: SetState) -> float:
 
 
 @kernel
-def assign(state: SetState) -> None:
+def assign_pixels_and_tracks(state: SetState) -> None:
     """Assign pixels, of which none is assigned, and tracks to the members, in their order."""
     for a in range(state.size[0]):
         _assign_pixels(state.members[a], state)

@@ -18,7 +18,7 @@ _ROUNDING_MARGIN = 1e-12
 """Longer paths are better only by more, nats."""
 
 
-class TrackState(NamedTuple):
+class TrackAssignment(NamedTuple):
     """Tracks of candidates, and their assignment to a set."""
 
     gains: RaggedArray
@@ -36,7 +36,7 @@ class TrackState(NamedTuple):
 
 
 @kernel
-def track_state(track_gain: Floats, birth_cost: Floats) -> TrackState:
+def track_state(track_gain: Floats, birth_cost: Floats) -> TrackAssignment:
     """The tracks of candidates, without members, by gains (candidate, track) and costs of births (candidate,)."""
     candidates, tracks = track_gain.shape
     number = np.zeros(candidates, np.int64)
@@ -49,11 +49,11 @@ def track_state(track_gain: Floats, birth_cost: Floats) -> TrackState:
             if birth_cost[i] + track_gain[i, k] > 0.0:
                 append(gains, place, i, k, birth_cost[i] + track_gain[i, k])
     none = np.full(tracks, -1, np.int64)
-    return TrackState(gains, none, np.zeros(tracks), none.copy(), np.full(tracks, -np.inf), none.copy())
+    return TrackAssignment(gains, none, np.zeros(tracks), none.copy(), np.full(tracks, -np.inf), none.copy())
 
 
 @kernel
-def assign_tracks(members: Ints, count: int, state: TrackState) -> None:
+def assign_tracks(members: Ints, count: int, state: TrackAssignment) -> None:
     """Assign tracks to the first `count` members, one to one, at the greatest sum."""
     state.member_of[:] = -1
     for a in range(count):
@@ -61,7 +61,7 @@ def assign_tracks(members: Ints, count: int, state: TrackState) -> None:
 
 
 @kernel
-def assign_track(i: int, state: TrackState) -> None:
+def assign_track(i: int, state: TrackAssignment) -> None:
     """Assign tracks to one more member."""
     number = _find_paths(i, state)
     k, _ = _best_end(number, state)
@@ -74,7 +74,7 @@ def assign_track(i: int, state: TrackState) -> None:
 
 
 @part
-def track_gain(i: int, state: TrackState) -> float:
+def track_gain(i: int, state: TrackAssignment) -> float:
     """Gain of candidate i from the assignment of tracks, nats."""
     number = _find_paths(i, state)
     _, gain = _best_end(number, state)
@@ -83,7 +83,7 @@ def track_gain(i: int, state: TrackState) -> float:
 
 
 @part
-def _find_paths(i: int, state: TrackState) -> int:
+def _find_paths(i: int, state: TrackAssignment) -> int:
     """Find the best path from candidate i to each track; returns how many tracks have one."""
     gains, path_gain, reached = state.gains, state.path_gain, state.reached
     number = 0
@@ -111,7 +111,7 @@ def _find_paths(i: int, state: TrackState) -> int:
 
 
 @part
-def _best_end(number: int, state: TrackState) -> tuple[int, float]:
+def _best_end(number: int, state: TrackAssignment) -> tuple[int, float]:
     """The track at which the best path ends, -1 for none that gains, and its gain, nats."""
     best, best_gain = -1, 0.0
     for r in range(number):
@@ -134,6 +134,6 @@ def _gain_of(i: int, track: int, gains: RaggedArray) -> float:
 
 
 @part
-def _clear_paths(number: int, state: TrackState) -> None:
+def _clear_paths(number: int, state: TrackAssignment) -> None:
     for r in range(number):
         state.path_gain[state.reached[r]] = -np.inf

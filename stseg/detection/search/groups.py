@@ -13,7 +13,7 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, append, ragged_array
 from stseg.detection.score.scoring import body_distance
 from stseg.detection.score.set_state import SetState
-from stseg.detection.score.track_state import TrackState
+from stseg.detection.score.track_state import TrackAssignment
 from stseg.kernels.accelerate import kernel, part
 
 
@@ -54,7 +54,7 @@ def fill_groups(state: SetState, group: Ints) -> int:
 
 
 @kernel
-def _followers(tracks: TrackState) -> RaggedArray:
+def _followers(tracks: TrackAssignment) -> RaggedArray:
     """The candidates who may continue each track."""
     followers, place = ragged_array(np.bincount(tracks.gains.item, minlength=len(tracks.member_of)))
     for i in range(len(tracks.gains.start) - 1):

@@ -12,7 +12,17 @@ import numpy as np
 from stseg.arrays import Flags, Ints
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.box_state import clear_cache
-from stseg.detection.score.set_state import SetState, add, assign, changed, gain, put, release, score, withdraw
+from stseg.detection.score.set_state import (
+    SetState,
+    add,
+    assign_pixels_and_tracks,
+    changed,
+    gain,
+    put,
+    release,
+    score,
+    withdraw,
+)
 from stseg.kernels.accelerate import kernel, part
 
 SCORE_TOLERANCE = 1e-9
@@ -101,7 +111,7 @@ def _insert_and_prune(i: int, partners: Flags, state: SetState) -> bool:
     Where just one nearby member is removed, that is a simple replacement, which was tried.
     """
     clear_cache(state.boxes)
-    assign(state)
+    assign_pixels_and_tracks(state)
     is_worth = gain(i, state, True) >= _INSERTION_GAIN
     release(state)
     if not is_worth:
@@ -129,7 +139,7 @@ def _add_best(group: Ints, state: SetState) -> None:
     if outside == 0:
         return
     gains = np.full(len(group), np.inf)
-    assign(state)
+    assign_pixels_and_tracks(state)
     while True:
         best, best_gain = -1, SCORE_TOLERANCE
         for k in range(len(group)):
@@ -147,7 +157,7 @@ def _add_best(group: Ints, state: SetState) -> None:
 @kernel
 def _remove_worthless(fixed: int, removable: Flags, state: SetState) -> None:
     """Remove each member that lowers the score, of those that are removable (candidate,), but not `fixed`."""
-    assign(state)
+    assign_pixels_and_tracks(state)
     a = 0
     while a < state.size[0]:
         if not removable[state.members[a]] or state.members[a] == fixed:
@@ -171,7 +181,7 @@ def _replace(group: Ints, state: SetState) -> bool:
     if rivals == 0:
         return False
     is_changed = False
-    assign(state)
+    assign_pixels_and_tracks(state)
     for a in range(state.size[0]):
         if not _has_rival(state.members[a], group, state):
             continue

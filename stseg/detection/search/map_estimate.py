@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Shorts
-from stseg.bodies.outlines import paint
+from stseg.bodies.outlines import paint_outlines
 from stseg.bodies.views import BoxView, PixelView
 from stseg.detection.evidence.candidate_evidence import ProjectedBodies
 from stseg.detection.frame_evidence import FrameEvidence
@@ -184,7 +184,7 @@ class MapEstimate:
         pixels = self.problem.pixels
         for k, owner in enumerate(rasters):
             farthest_first = np.argsort(pixels.distance[k][self.members], kind="stable")[::-1].copy()
-            paint(farthest_first, pixels.first[k][self.members], pixels.spans[k][self.members], owner)
+            paint_outlines(farthest_first, pixels.first[k][self.members], pixels.spans[k][self.members], owner)
         return assignment
 
     @property

@@ -62,7 +62,7 @@ class RefinedPlaces:
     """float64 (n,): variance of the height, marginalised likewise, square metres."""
 
 
-def refine(
+def refine_places_and_heights(
     pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, track_index: Ints
 ) -> RefinedPlaces:
     """The posterior of each person's place and height, by the boxes and pixels assigned to each.
@@ -86,7 +86,7 @@ def refine(
 def refine_places(
     pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, track_index: Ints
 ) -> RefinedPlaces:
-    """The posterior of each person's place alone, by pixels, at its height in the pool; arguments of `refine`."""
+    """The posterior of each person's place alone, by pixels, at its height in the pool; arguments as above."""
     patch, views = pool.ground[:, None] + _PATCH, evidence.views
     score = np.zeros(patch.shape[:2])
     heights, widths = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))

@@ -10,7 +10,7 @@ from stseg.arrays import Floats, Ints
 from stseg.bodies.views import BoxView
 from stseg.detection.search.body_sizes import body_sizes
 from stseg.detection.search.map_estimate import MapEstimate
-from stseg.detection.search.refine import EvidenceAssignment, refine, refine_places
+from stseg.detection.search.refine import EvidenceAssignment, refine_places, refine_places_and_heights
 from stseg.records.candidates import Candidates
 from stseg.records.sizes import Sizes
 
@@ -67,7 +67,7 @@ def _refined(
 ) -> RefinedPeople:
     """People at the means of their posteriors, sought about where they start, by the evidence assigned to each."""
     evidence, prior = estimate.evidence, estimate.evidence.prior
-    places = refine(start, evidence, assignment, track_index)
+    places = refine_places_and_heights(start, evidence, assignment, track_index)
     sizes = body_sizes(places, start.width, evidence.views, evidence.observations, assignment, prior.body)
     track_sizes = prior.track_sizes(sizes, track_index)
     pool = Candidates(places.ground, sizes.height, track_sizes.width)

@@ -163,7 +163,7 @@ def _covered_frames(recording: Recording, camera: int, part: range, streams: Str
     if streams is None:
         delay = max(0, recording.sources[camera].offset - part.start)
         return range(part.start + delay, part.stop + delay)
-    frames = np.flatnonzero(streams.coverage(recording)[camera])
+    frames = np.flatnonzero(streams.frame_coverage(recording)[camera])
     begin, end = frames.searchsorted([part.start, part.stop]).tolist()
     lacking = len(part) - (end - begin)
     begin = max(0, min(begin - lacking // 2, len(frames) - len(part)))

@@ -29,7 +29,7 @@ _VOLUME_RADIUS = 1.0
 _Volumes = list[tuple[PackedFrame, PackedFrame]]
 
 
-class _Step(NamedTuple):
+class _PendingFrames(NamedTuple):
     """Committed frames on their way to the file.
 
     Attributes
@@ -70,7 +70,7 @@ class SegmentWriter(ExitStack):
         super().__init__()
         self.segment = segment
         self._job, self._draft = job, draft
-        self._steps = deque[_Step]()
+        self._steps = deque[_PendingFrames]()
         self._writer = self.enter_context(
             RunWriter(draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume)
         )
@@ -96,7 +96,7 @@ class SegmentWriter(ExitStack):
             volumes.set_result(_packed_volumes(self._job, results))
         else:
             volumes = executor.submit(_packed_volumes, self._job, results)
-        self._steps.append(_Step(trajectory, results, volumes, within))
+        self._steps.append(_PendingFrames(trajectory, results, volumes, within))
         if len(self._steps) > 1:
             self._append(self._steps.popleft())
 
@@ -108,7 +108,7 @@ class SegmentWriter(ExitStack):
         self.close()
         return keep_segment(self._draft)
 
-    def _append(self, step: _Step) -> None:
+    def _append(self, step: _PendingFrames) -> None:
         results, writer = step.results, self._writer
         writer.append("trajectory", step.trajectory)
         writer.append("timings", results.timings)

@@ -22,7 +22,7 @@ from stseg.identities.search.extension import (
     empty_alternatives,
     empty_extension,
     end_identities,
-    fill_cheapest,
+    fill_cheapest_identities,
     fill_identities,
     fill_least,
     impose_identity,
@@ -122,7 +122,7 @@ def _fill_alternatives(
         end_identities(hypotheses, pasts, h, first, frames.seconds[k], observed, people, rules)
         identities = fill_identities(hypotheses, pasts, h, costs, one)
         _impose(hypotheses.bound, h, people, k, first, one, identities)
-        if not fill_cheapest(one, identities):
+        if not fill_cheapest_identities(one, identities):
             fill_least(one, identities, slots)
         cost = 0.0
         for i in range(column.shape[1]):

@@ -64,7 +64,7 @@ class _Choices(NamedTuple):
 
 
 @dataclass
-class _Step:
+class _FrameChoices:
     """The choices of one frame: parent (k,) and names (k, row), and the frame's observations and time."""
 
     parent: Ints
@@ -78,14 +78,16 @@ class _History:
     """Choices of the latest frames, until names are final."""
 
     name: Ints
-    steps: list[_Step] = field(default_factory=list)
+    steps: list[_FrameChoices] = field(default_factory=list)
 
     def add(self, choices: _Choices, observations: Observations, begin: int) -> None:
         """Add the choices of the next frames, from the one of number `begin` on."""
         for k, number in enumerate(choices.number.tolist()):
             first, stop = observations.start[begin + k : begin + k + 2].tolist()
             names = choices.names[k, :number, : stop - first]
-            self.steps.append(_Step(choices.parent[k, :number], names, first, float(observations.seconds[begin + k])))
+            self.steps.append(
+                _FrameChoices(choices.parent[k, :number], names, first, float(observations.seconds[begin + k]))
+            )
 
     def decide(self, until: float, number: int) -> Ints:
         """Make names up to a time final, by the best hypothesis; which of the `number` hypotheses agree, int64 (k,)."""

@@ -125,7 +125,7 @@ def impose_identity(one: Extension, identities: int, bound: int, row: int, same:
 
 
 @part
-def fill_cheapest(one: Extension, identities: int) -> bool:
+def fill_cheapest_identities(one: Extension, identities: int) -> bool:
     """Fill the cheapest identity of each doubtful row; whether no other assignment is as cheap.
 
     It is the best one where each row has one cheapest identity of its own.

@@ -63,7 +63,7 @@ def thin_sheets(frames: Ints, grid: Grid, read_frame: ReadFrame, budget: int, wa
         Without frames where there are none.
     """
     most = int(np.clip(_MAX_CELLS // np.prod(grid.shape), 3, _MAX_FRAMES))
-    chosen = spread(frames, most)
+    chosen = evenly_spaced(frames, most)
     probes = chosen[len(chosen) // 6 :: max(1, len(chosen) // 3)][:3]
     limit = max((colour_limit(read_frame(int(frame))[0]) for frame in probes), default=1.0)
     step = max(1, -(-max(grid.shape[1:]) // _MAX_SIDE))
@@ -75,7 +75,7 @@ def thin_sheets(frames: Ints, grid: Grid, read_frame: ReadFrame, budget: int, wa
     return Sheets(sheet_frames, shape, limit, [pngs[int(frame)] for frame in sheet_frames])
 
 
-def spread(frames: Ints, most: int) -> Ints:
+def evenly_spaced(frames: Ints, most: int) -> Ints:
     """At most so many of the frames, evenly spread, the first and the last among them."""
     if len(frames) <= most:
         return frames

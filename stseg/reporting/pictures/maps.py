@@ -136,7 +136,7 @@ def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks
     limit = float(np.percentile(values[values > 0], 99)) if (values > 0).any() else 1.0
     plan = map_of_maps(rig)
     canvas = sheet(plan, title)
-    paint(canvas, plan, bins, warm_colours(values, limit))
+    paint_bins(canvas, plan, bins, warm_colours(values, limit))
     draw_ground(canvas, plan, rig)
     for letter, mark in zip("ABC", marks, strict=False):
         u, v = plan.pixel(np.array([mark.x, mark.y])).tolist()
@@ -152,7 +152,7 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     view_count = views.max(axis=0)
     most = max(len(rig.cameras), int(view_count.max()))
     tones = [_blind_tone(count, most) for count in range(most + 1)]
-    paint(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[view_count])
+    paint_bins(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[view_count])
     draw_ground(canvas, plan, rig)
     u, v = 76.0, plan.size[1] - 38.0
     wide = min(44.0, 460.0 / len(tones))
@@ -165,7 +165,7 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     return canvas
 
 
-def paint(canvas: Bytes, plan: PlanMap, bins: Bins, colours: Bytes) -> None:
+def paint_bins(canvas: Bytes, plan: PlanMap, bins: Bins, colours: Bytes) -> None:
     """Paint bins uint8 (y, x, 3) onto a plan."""
     (left, top), (right, bottom) = (
         np.rint(plan.pixel(np.array(corner))).astype(int).tolist()

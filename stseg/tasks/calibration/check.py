@@ -10,7 +10,7 @@ from pathlib import Path
 
 from stseg.arrays import Floats, Observation
 from stseg.calibration.check.box_correspondence import isolated_boxes
-from stseg.calibration.check.rig_check import Check, coverage, verdict_text
+from stseg.calibration.check.rig_check import Check, cell_coverage, verdict_text
 from stseg.calibration.check.rig_check import check_rig as check_boxes
 from stseg.calibration.check.verdict import Disagreement
 from stseg.config import Config
@@ -100,7 +100,7 @@ class RigCheck:
             for camera, view in views
         ]
         words = "How many views see each ground cell at some height."
-        return [*grids, Figure("coverage", blind_map(rig, coverage(rig)), words)]
+        return [*grids, Figure("coverage", blind_map(rig, cell_coverage(rig)), words)]
 
     def write_page(self, output: Path, overwrite: bool = False) -> None:
         """Write verdict and pictures as one HTML page, which holds images of the cameras."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Ints
 from stseg.calibration.points.point_fit import PointFit, Points, fit_points
-from stseg.calibration.points.point_requirements import require_height
+from stseg.calibration.points.point_requirements import require_camera_height
 from stseg.engine.recordings import AnySource, camera_source
 from stseg.errors import ConfigError
 from stseg.geometry import Grid, Rig
@@ -101,7 +101,7 @@ def calibrate_points(
         known_lens = None if lens is None else read_opencv_lens(Path(lens.replace("{name}", table.camera)))
         metres = table.place * UNITS[unit]
         fits.append(fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), known_lens))
-        require_height(fits[-1].camera, unit, UNITS)
+        require_camera_height(fits[-1].camera, unit, UNITS)
     names = [table.camera for table in tables]
     rig = Rig(scene or output.stem, frame_rate, grid, tuple(fit.camera for fit in fits))
     recording = Recording(output, rig, tuple(map(camera_source, _sources(sources, names))))

@@ -21,8 +21,3 @@ def assign(cost: Floats, alone: float) -> tuple[Ints, Ints]:
         rows, columns = columns[rows], rows
     kept = gain[rows, columns] < 0
     return rows[kept], columns[kept]
-
-
-def distances(a: Floats, b: Floats) -> Floats:
-    """Distances of every point (n, 2) from every other (m, 2), metres, float64 (n, m)."""
-    return np.asarray(np.hypot(*np.moveaxis(a[:, None] - b[None], -1, 0)))

@@ -14,10 +14,10 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.config import Config, MotionConfig
+from stseg.geometry.distances import distances
 from stseg.records.people import People
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
-from stseg.tracking.filter.assignment import distances
 from stseg.tracking.filter.motion_model import process_noise, transition
 
 _SIZE_DRIFT = 0.002

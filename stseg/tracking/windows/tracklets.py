@@ -10,8 +10,9 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.config import TrackingConfig
+from stseg.geometry.distances import distances
 from stseg.records.blobs import UNASSIGNED, Blobs
-from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.assignment import assign
 
 
 @dataclass
