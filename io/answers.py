@@ -11,8 +11,6 @@ from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
 from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, one_of, parse_whole
 
-COLUMNS = ("action", "frame", "id", "other", "name")
-
 
 @dataclass(frozen=True)
 class AnswerRow:

@@ -15,8 +15,6 @@ class Variant:
     ----------
     name
         In the table and in the names of run files.
-    words
-        In the tables.
     tracker
         Of `stseg run`.
     setting
@@ -26,7 +24,6 @@ class Variant:
     """
 
     name: str
-    words: str
     tracker: str
     setting: str = ""
     colour: bool = False
@@ -40,14 +37,14 @@ class Variant:
 VARIANTS = {
     variant.name: variant
     for variant in (
-        Variant("cut", "cut", "cut"),
-        Variant("frames", "frames", "frames"),
-        Variant("kalman", "kalman", "kalman"),
-        Variant("particles", "particles", "particles", colour=True),
-        Variant("particles-search", "particles: search alone", "particles", "particles.method=search", True),
-        Variant("particles-generic", "particles: generic filter", "particles", "particles.method=generic", True),
-        Variant("belief", "belief", "belief", colour=True),
-        Variant("belief-condensation", "belief: each view by itself", "belief", "belief.method=condensation", True),
+        Variant("cut", "cut"),
+        Variant("frames", "frames"),
+        Variant("kalman", "kalman"),
+        Variant("particles", "particles", colour=True),
+        Variant("particles-search", "particles", "particles.method=search", True),
+        Variant("particles-generic", "particles", "particles.method=generic", True),
+        Variant("belief", "belief", colour=True),
+        Variant("belief-condensation", "belief", "belief.method=condensation", True),
     )
 }
 """In the order of the tables."""

@@ -12,6 +12,7 @@ from scipy.linalg import rq
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera
+from stseg.geometry.rig import CAMERA_HEIGHTS
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 
 Up = Literal["+z", "-z", "+y", "-y", "+x", "-x"]
@@ -26,7 +27,6 @@ _TURNS: dict[Up, list[list[float]]] = {
     "-x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
 }
 _USUAL_HEIGHT = 2.5  # metres above the ground, of a camera
-_HEIGHTS = (0.3, 60.0)  # metres, range of camera heights
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,15 +103,15 @@ def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False)
 def require_median_height(cameras: Sequence[ForeignCamera], world: World) -> None:
     """Refuse a unit with implausible camera heights where another gives plausible ones; raises CalibrationError."""
     height = median_height(cameras, world)
-    if height <= 0 or _HEIGHTS[0] <= height <= _HEIGHTS[1]:
+    if height <= 0 or CAMERA_HEIGHTS[0] <= height <= CAMERA_HEIGHTS[1]:
         return
     better = guess_unit(cameras, world.up, world.mirrored)
-    if _HEIGHTS[0] <= height / world.metres * UNITS[better] <= _HEIGHTS[1]:
+    if CAMERA_HEIGHTS[0] <= height / world.metres * UNITS[better] <= CAMERA_HEIGHTS[1]:
         raise CalibrationError(
             cameras[0].file,
             f"--unit {world.unit}",
             f"cameras {height:.4g} m above the ground",
-            f"{_HEIGHTS[0]} to {_HEIGHTS[1]:.0f} m: are its lengths in {better}? (--unit {better})",
+            f"{CAMERA_HEIGHTS[0]} to {CAMERA_HEIGHTS[1]:.0f} m: are its lengths in {better}? (--unit {better})",
         )
 
 

@@ -21,12 +21,10 @@ from typing import Self
 
 from stseg.arrays import Observation
 from stseg.config import LiveConfig
-from stseg.io.live.live_stream import Capture, FFmpegCapture, LiveStream, TimedPicture, now
+from stseg.io.live.live_stream import STOP_INTERVAL, Capture, FFmpegCapture, LiveStream, TimedPicture, now
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import Recording
 
-_POLL = 0.2
-"""Interval at which a request to stop is noticed while waiting, seconds."""
 _SLACK = 0.5
 """Lateness of the clock thread up to which no picture is lost, seconds."""
 _START_DELAY = 0.5
@@ -110,7 +108,7 @@ class FollowedCameras(AbstractContextManager["FollowedCameras"], Iterator[FrameS
                 if stream.failure is not None:
                     raise stream.failure
             with self._ready:
-                if self._queue or self._ready.wait(_POLL):
+                if self._queue or self._ready.wait(STOP_INTERVAL):
                     return self._queue.popleft()
             if not self._clock.is_alive() and not self._queue:
                 raise StopIteration
@@ -162,7 +160,7 @@ class FollowedCameras(AbstractContextManager["FollowedCameras"], Iterator[FrameS
                     first_times and now() > min(first_times) + self._config.stream_timeout
                 ):
                     return True
-                self._arrival.wait(_POLL)
+                self._arrival.wait(STOP_INTERVAL)
         return False
 
     def _views(self, at: Sequence[float]) -> tuple[Observation, ...] | None:
@@ -176,7 +174,7 @@ class FollowedCameras(AbstractContextManager["FollowedCameras"], Iterator[FrameS
                     return tuple(self._nearest(stream, time) for stream, time in zip(self._streams, at, strict=True))
                 if self._stopped():
                     return None
-                self._arrival.wait(min(rest, _POLL))
+                self._arrival.wait(min(rest, STOP_INTERVAL))
 
     def _has_passed(self, stream: LiveStream, time: float) -> bool:
         """Whether later pictures cannot be nearer to the time."""

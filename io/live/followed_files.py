@@ -14,12 +14,10 @@ from threading import Event
 from stseg.arrays import Observation
 from stseg.config import LiveConfig
 from stseg.io.live.arriving_files import ArrivingFiles, ArrivingVideos, FileNotes
+from stseg.io.live.live_stream import STOP_INTERVAL
 from stseg.io.recording.aligned_stream import AlignedStream
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import Recording
-
-_POLL = 0.2
-"""Interval at which a request to stop is noticed while waiting, seconds."""
 
 
 class FollowedFiles(AbstractContextManager["FollowedFiles"], Iterator[FrameSet]):
@@ -80,10 +78,10 @@ class FollowedFiles(AbstractContextManager["FollowedFiles"], Iterator[FrameSet])
         """Wait for the next frame of every camera; False where the run is asked to stop."""
         waited, reported = 0.0, False
         while not self._halt.is_set():
-            done, missing = wait(self._ahead, _POLL)
+            done, missing = wait(self._ahead, STOP_INTERVAL)
             if not missing:
                 return True
-            waited += _POLL if done else 0.0
+            waited += STOP_INTERVAL if done else 0.0
             if not reported and waited > self._config.file_quiet_time + self._config.stream_timeout:
                 pairs = zip(self._streams, self._ahead, strict=True)
                 names = [stream.camera.name for stream, view in pairs if not view.done()]

@@ -21,6 +21,8 @@ from stseg.io.recording.pictures import picture_observation, reduced_picture
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.source_files import is_pattern
 
+STOP_INTERVAL = 0.2
+"""Interval at which a request to stop is noticed while waiting, seconds."""
 _PROTOCOLS = "rtsp,rtsps,rtp,srtp,rtmp,rtmps,rtmpt,srt,udp,tcp,tls,http,https,httpproxy,crypto"
 _OPTIONS = f"rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000|protocol_whitelist;{_PROTOCOLS}"
 """RTSP over TCP, without buffering; one second (in microseconds) to probe the format; no local files."""

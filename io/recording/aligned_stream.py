@@ -181,11 +181,6 @@ class StreamIndex:
         return (int(multiple[0]), int(multiple[-1]) + 1) if len(multiple) else (0, self.length)
 
 
-def count_frames(recording: Recording) -> int:
-    """Number of frames of a recording; raises as `index_streams` does."""
-    return index_streams(recording).length
-
-
 def index_streams(recording: Recording) -> StreamIndex:
     """Index a recording: its number of frames, their stamps and the alignment of its cameras, by decoding all.
 

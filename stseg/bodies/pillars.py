@@ -82,13 +82,6 @@ class BodyTable(NamedTuple):
         _fill_boxes(self, place, tall, filled)
         return filled
 
-    def discs(self, ground: Floats, height: float) -> Floats:
-        """The discs of one pillar: centre u, v and the Jacobian times radius (2x2), float64 (disc, 6)."""
-        filled = np.full((len(PROFILE), 6), np.nan)
-        lattice = (np.asarray(ground, float) - self.origin) / self.step
-        fill_discs(self, lattice[0], lattice[1], height, PROFILE, filled)
-        return filled
-
 
 @kernel
 def fill_discs(

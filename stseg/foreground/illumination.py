@@ -25,9 +25,9 @@ from scipy.ndimage import gaussian_filter, minimum_filter
 from stseg.arrays import Bytes, Flags, Singles
 from stseg.config import IlluminationConfig
 from stseg.foreground.background.model import Background
+from stseg.foreground.channel_gain import STRIDE
 from stseg.foreground.gain_field import gain_field
 
-_STRIDE = 4  # pixels; a sixteenth of them are ample for a share
 _FAINT_SHARE = 0.25  # of the rise that is a change: from there on a smooth field is tried
 _FIELD_DEVIATION, _FIELD_SHARE = 0.03, 0.4  # a field is light if its logarithm differs from its median on this share
 _EQUAL_COLOUR = 20.0  # grey levels within which colours agree, in the channel that differs most
@@ -113,7 +113,7 @@ class IlluminationMonitor:
 
     def _share(self, likelihood: Singles) -> float:
         """Share of the view with a likelihood above the prior."""
-        return float((likelihood[::_STRIDE, ::_STRIDE] > np.float32(self.model.prior)).mean())
+        return float((likelihood[::STRIDE, ::STRIDE] > np.float32(self.model.prior)).mean())
 
     def _share_rise(self, likelihood: Singles) -> float:
         """Rise of that share within the window."""
@@ -160,7 +160,7 @@ class IlluminationMonitor:
 
     def _explains(self, gain: Singles, image: Bytes, likelihood: Singles, empty: Singles) -> bool:
         """Whether gains explain most of the new foreground."""
-        few = np.s_[::_STRIDE, ::_STRIDE]
+        few = np.s_[::STRIDE, ::STRIDE]
         expected = np.minimum(gain[few] * self.model.background_image()[few], 255)
         agrees = np.abs(image[few] - expected).max(-1) <= _EQUAL_COLOUR
         new = (likelihood[few] > self.model.prior) & (empty[few] > 0.5)
@@ -169,7 +169,7 @@ class IlluminationMonitor:
 
 def _is_broad(gain: Singles) -> bool:
     """Whether a field differs over much of the view; a field that differs locally follows a body."""
-    logarithm = np.log(gain[::_STRIDE, ::_STRIDE])
+    logarithm = np.log(gain[::STRIDE, ::STRIDE])
     differs = np.abs(logarithm - np.median(logarithm, axis=(0, 1))).max(-1) > _FIELD_DEVIATION
     return bool(differs.mean() > _FIELD_SHARE)
 

@@ -160,6 +160,8 @@ def is_mirrored(camera: Camera, grid: Grid) -> bool:
 
 BODY_HEIGHT = 1.7
 """Height of a standing person, metres."""
+CAMERA_HEIGHTS = (0.3, 60.0)
+"""Plausible heights of cameras above the ground, metres."""
 
 
 def greatest_reduction(camera: Camera, grid: Grid, rows: float) -> int:

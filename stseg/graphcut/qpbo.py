@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from stseg.arrays import Flags, Ints
 from stseg.graphcut.sparse import sparse_cut
 
-ENUMERATION_LIMIT = 12
+COMPONENT_LIMIT = 12
 """Largest component of undecided nodes that is enumerated."""
 
 
@@ -56,29 +56,26 @@ class QuadraticMinimum:
     labels : bool (n,)
     gap
         Bound on the distance from the least energy, quanta; 0 where the labels are a global minimum.
-    undecided
-        Number of nodes that roof duality left open.
     """
 
     labels: Flags
     gap: int
-    undecided: int
 
 
 def minimise(energy: QuadraticEnergy, cut: Callable[..., Flags] = sparse_cut) -> QuadraticMinimum:
     """Labels of least energy, or close to it with a bound."""
     if not (energy.weight > 0).any():
-        return QuadraticMinimum(_submodular(energy, cut), 0, 0)
+        return QuadraticMinimum(_submodular(energy, cut), 0)
     labels, open_, bound = _roof_dual(energy, cut)
     exact = True
     for nodes in _components(energy, open_):
-        if len(nodes) <= ENUMERATION_LIMIT:
+        if len(nodes) <= COMPONENT_LIMIT:
             _enumerate(energy, labels, nodes)
         else:
             exact = False
             _improve(energy, labels, nodes)
     gap = 0 if exact else max(energy.of(labels) - bound, 0)
-    return QuadraticMinimum(labels, gap, int(open_.sum()))
+    return QuadraticMinimum(labels, gap)
 
 
 def _submodular(energy: QuadraticEnergy, cut: Callable[..., Flags]) -> Flags:

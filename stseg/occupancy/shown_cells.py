@@ -23,7 +23,7 @@ from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable, sum_of
 from stseg.kernels.accelerate import kernel
 
-SIDE = 4
+BLOCK_SIDE = 4
 """Cells along the side of a block."""
 _NEARLY_ALL = 0.75
 """Share of blocks from which all are taken: to list cells anew in each frame would cost more than to fuse the rest."""
@@ -151,7 +151,7 @@ class CellTables:
         return ShownCells(cell, place, block, start, unseen, person, number)
 
     def _cells_of(self, marked: Flags, views: Bytes) -> _MarkedCells:
-        sets, most = self.sets, int(marked.sum()) * SIDE**2
+        sets, most = self.sets, int(marked.sum()) * BLOCK_SIDE**2
         cell, place, block, view_set = np.empty((4, most), np.int32)
         others = sets.size.copy()
         count = _fill_cells(marked, views, sets.of_cell, cell, place, block, view_set, others)
@@ -178,7 +178,7 @@ def mark_map(reach: Reach, table: SumTable, marked: Flags) -> None:
 
 def blocks_of(values: AnyArray, reduced: np.ufunc) -> AnyArray:
     """Values of cells (plane, y, x, ...) reduced over blocks, (plane, block row, block column, ...)."""
-    rows, columns = (np.arange(0, side, SIDE) for side in values.shape[1:3])
+    rows, columns = (np.arange(0, side, BLOCK_SIDE) for side in values.shape[1:3])
     return np.asarray(reduced.reduceat(reduced.reduceat(values, rows, 1), columns, 2))
 
 
@@ -212,8 +212,8 @@ def _fill_cells(
         for j in range(marked.shape[1]):
             for i in range(marked.shape[2]):
                 if marked[z, j, i]:
-                    for y in range(j * SIDE, min((j + 1) * SIDE, rows)):
-                        for x in range(i * SIDE, min((i + 1) * SIDE, columns)):
+                    for y in range(j * BLOCK_SIDE, min((j + 1) * BLOCK_SIDE, rows)):
+                        for x in range(i * BLOCK_SIDE, min((i + 1) * BLOCK_SIDE, columns)):
                             if views[z, y, x] > 0:
                                 cell[count], place[count] = (z * rows + y) * columns + x, y * columns + x
                                 block[count] = (z * marked.shape[1] + j) * marked.shape[2] + i

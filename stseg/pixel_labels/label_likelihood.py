@@ -28,7 +28,7 @@ from stseg.bodies.pillars import WIDTH, BodyTable
 from stseg.config import BodyConfig, LabelConfig
 from stseg.kernels.accelerate import kernel
 
-MARGIN = 0.15
+_PILLAR_MARGIN = 0.15
 """Margin around the pillars in which pixels of the body may lie, as a share of their height in the image."""
 _THINNEST = 0.3
 """Least width, as a share of the mean."""
@@ -88,7 +88,7 @@ def _edges(first: Ints, spans: Spans, draws: int, size: tuple[int, int]) -> Ints
     high = np.stack([np.where(drawn, spans[..., 1], 0), np.where(drawn, row + 1, 0)], -1)
     of_person = len(first) // draws, draws * spans.shape[1], 2
     low, high = low.reshape(of_person).min(1), high.reshape(of_person).max(1)
-    around = np.ceil(MARGIN * (high - low)[:, 1:]).astype(np.int64)
+    around = np.ceil(_PILLAR_MARGIN * (high - low)[:, 1:]).astype(np.int64)
     edges = np.concatenate([np.maximum(low - around, 0), np.minimum(high + around, size)], 1).astype(np.int64)
     edges[high[:, 0] <= low[:, 0]] = 0
     return edges

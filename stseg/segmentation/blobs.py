@@ -11,9 +11,7 @@ from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
 from stseg.records.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_measures import BlobMeasures, fill_ground_labels, fill_measures, fill_nearest
-from stseg.segmentation.patches import GroundPatches
-
-_EIGHT = np.ones((3, 3), int)
+from stseg.segmentation.patches import EIGHT_NEIGHBOURS, GroundPatches
 
 
 def find_blobs(
@@ -54,7 +52,7 @@ def _in_ground_order(occupied: Flags, place: Ints) -> tuple[Labels, int]:
     """Components of what is taken on a sheet (row, column), from 1 in the order of their first ground cells."""
     if not occupied.any():
         return np.zeros(occupied.shape, np.int32), 0
-    found, number = connected(occupied, _EIGHT)
+    found, number = connected(occupied, EIGHT_NEIGHBOURS)
     component: Labels = np.asarray(found, np.int32)
     if number < 2:
         return component, number
@@ -111,7 +109,7 @@ def _measured(
 def _touches(cells: Labels, number: int) -> Ints:
     """Pairs of blobs, from 0, in one connected component of the ground, int64 (k, 2)."""
     occupied = cells > 0
-    component = connected(occupied, _EIGHT)[0][occupied]
+    component = connected(occupied, EIGHT_NEIGHBOURS)[0][occupied]
     members = np.unique(component.astype(np.int64) * (number + 1) + cells[occupied])
     component, blob = np.divmod(members, number + 1)
     first, second = np.nonzero(np.triu(component[:, None] == component, 1))

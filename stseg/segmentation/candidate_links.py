@@ -17,7 +17,7 @@ from stseg.config import BodyConfig, MotionConfig
 from stseg.kernels.accelerate import kernel
 from stseg.records.predicted_tracks import LEAST_HEIGHT_RATIO, PLACE_RESOLUTION
 from stseg.records.sizes import log_heavy_tailed
-from stseg.segmentation.label_energy import GATE
+from stseg.segmentation.label_energy import PLACE_GATE
 
 _ABSENCE = 4.0
 """Cost of a frame without a candidate inside a path, nats per second."""
@@ -73,7 +73,7 @@ class LinkModel:
         absence = _ABSENCE * (seconds - 1 / self.frame_rate)
         bonus = place - self.prior_log_odds + self._height_ratio(found, start, end) - absence
         bonus = bonus + birth[end] + death[start]
-        kept = (bonus > 0) & (square < GATE)
+        kept = (bonus > 0) & (square < PLACE_GATE)
         return start[kept], end[kept], bonus[kept]
 
     def _near(self, found: WindowCandidates) -> tuple[Ints, Ints]:
@@ -120,7 +120,7 @@ def _fill_near(
                 continue
             # The square distance is at least that by the sum of both variances: most pairs need no inverse.
             spread = variance + covariance[j, 0, 0] + covariance[j, 1, 1] + 2.0 * (speed * frames) * (speed * frames)
-            if (ground[j, 0] - x) ** 2 + (ground[j, 1] - y) ** 2 < GATE * spread:
+            if (ground[j, 0] - x) ** 2 + (ground[j, 1] - y) ** 2 < PLACE_GATE * spread:
                 if found < len(pair):
                     pair[found, 0], pair[found, 1] = i, j
                 found += 1

@@ -26,7 +26,7 @@ from stseg.graphcut.grid_energy import QUANTUM
 from stseg.kernels.accelerate import kernel
 from stseg.records.predicted_tracks import PredictedPlaces
 
-GATE = 13.8
+PLACE_GATE = 13.8
 """Squared Mahalanobis distance that one place in a thousand exceeds (chi square, two degrees of freedom)."""
 
 
@@ -105,7 +105,7 @@ def _fill_log_weights(
             dx, dy = ground[i, 0] - predicted_ground[t, k, 0], ground[i, 1] - predicted_ground[t, k, 1]
             inverse = precision[t, k]
             square = inverse[0, 0] * dx * dx + (inverse[0, 1] + inverse[1, 0]) * dx * dy + inverse[1, 1] * dy * dy
-            if not expected[t, k] or square > GATE:
+            if not expected[t, k] or square > PLACE_GATE:
                 weight[i, k] = -np.inf
                 continue
             above = max(height[i] - head_height[t, k], 0.0) / height_spread

@@ -29,11 +29,12 @@ from stseg.kernels.accelerate import kernel
 from stseg.records.sparse_volume import SparseVolume
 from stseg.segmentation.cell_motion import successor_cells
 
-SIDE = 8
+SQUARE_SIDE = 8
 """Cells along the side of the squares of which patches are made, and least distance of a patch's border."""
 _BETWEEN = np.float32(-30.0)
 """Log-odds of what is between patches, nats."""
-_EIGHT = np.ones((3, 3), bool)
+EIGHT_NEIGHBOURS = np.ones((3, 3), bool)
+"""Cells that touch at edges or corners are connected."""
 
 
 @dataclass(frozen=True)
@@ -49,14 +50,14 @@ class GroundPatches:
     @classmethod
     def of(cls, grid: Grid, squares: Flags) -> Self:
         """Patches that hold the marked squares, bool (square row, square column), and all beside them."""
-        grown = np.asarray(binary_dilation(squares, _EIGHT))
-        pieces, number = connected(grown, _EIGHT)
+        grown = np.asarray(binary_dilation(squares, EIGHT_NEIGHBOURS))
+        pieces, number = connected(grown, EIGHT_NEIGHBOURS)
         before = number + 1
         while number < before:
             for piece in find_objects(pieces):
                 grown[piece] = True
             before = number
-            pieces, number = connected(grown, _EIGHT)
+            pieces, number = connected(grown, EIGHT_NEIGHBOURS)
         rows, columns = grid.shape[1:]
         return cls._arranged(
             grid, [(_cells(down, rows), _cells(across, columns)) for down, across in find_objects(pieces)]
@@ -97,7 +98,7 @@ class GroundPatches:
         """Cells beside ground outside their patch, bool (row, column)."""
         inside = np.zeros(self.grid.shape[1:], bool)
         inside.reshape(-1)[self.place[self.place >= 0]] = True
-        edge = inside & ~binary_erosion(inside, _EIGHT, border_value=1)
+        edge = inside & ~binary_erosion(inside, EIGHT_NEIGHBOURS, border_value=1)
         return np.asarray(self.on_sheet(edge))
 
     @cached_property
@@ -151,7 +152,7 @@ class GroundPatches:
 
 
 def _cells(squares: slice, most: int) -> slice:
-    return slice(squares.start * SIDE, min(squares.stop * SIDE, most))
+    return slice(squares.start * SQUARE_SIDE, min(squares.stop * SQUARE_SIDE, most))
 
 
 def people_squares(grid: Grid, ground: Floats, ahead: Floats, reach: float) -> Flags:
@@ -163,8 +164,8 @@ def people_squares(grid: Grid, ground: Floats, ahead: Floats, reach: float) -> F
     squares = no_squares(grid)
     corners = np.sort(np.stack([grid.cell_of(ground), grid.cell_of(ahead)]), axis=0)
     margin = reach / grid.cell + 1
-    first = np.floor((corners[0] - margin) / SIDE).astype(np.int64).clip(0)
-    last = np.floor((corners[1] + margin) / SIDE).astype(np.int64)
+    first = np.floor((corners[0] - margin) / SQUARE_SIDE).astype(np.int64).clip(0)
+    last = np.floor((corners[1] + margin) / SQUARE_SIDE).astype(np.int64)
     for (left, top), (right, bottom) in zip(first.tolist(), last.tolist(), strict=True):
         if right >= 0 and bottom >= 0:
             squares[top : bottom + 1, left : right + 1] = True
@@ -173,13 +174,13 @@ def people_squares(grid: Grid, ground: Floats, ahead: Floats, reach: float) -> F
 
 def no_squares(grid: Grid) -> Flags:
     """No square marked, bool (square row, square column)."""
-    return np.zeros([-(-side // SIDE) for side in grid.shape[1:]], bool)
+    return np.zeros([-(-side // SQUARE_SIDE) for side in grid.shape[1:]], bool)
 
 
 def mark_places(squares: Flags, places: Ints, grid: Grid) -> None:
     """Mark the squares of ground cells (k,) of the flattened ground."""
     y, x = np.divmod(places, grid.shape[2])
-    squares[y // SIDE, x // SIDE] = True
+    squares[y // SQUARE_SIDE, x // SQUARE_SIDE] = True
 
 
 @kernel

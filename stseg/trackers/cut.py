@@ -33,10 +33,7 @@ from stseg.tracking.filter.prediction import earlier_detections, predicted_place
 from stseg.tracking.filter.track_filter import TrackFilter
 from stseg.tracking.windows.tracklets import form_tracklets
 from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
-from stseg.tracking.windows.windows import LONGEST, Window, windows
-
-_ENDLESS = 1 << 62
-"""Stop frame of a run without a known end."""
+from stseg.tracking.windows.windows import ENDLESS, LONGEST, Window, windows
 
 
 class CutTracker:
@@ -56,7 +53,7 @@ class CutTracker:
         self.pillar = BodyShape(config.occupancy.person_radius, spread, unassigned)
         self.open_frames: list[TrackedFrame] = []
         self.first = self.committed = first
-        self.coming = windows(rig.frame_rate, config.tracking, first, _ENDLESS)
+        self.coming = windows(rig.frame_rate, config.tracking, first, ENDLESS)
         self.window = next(self.coming)
 
     def predict(self, frame: int) -> PredictedTracks | None:

@@ -20,7 +20,7 @@ from stseg.baselines.kim_davis_2006.colours import BINS, FALL, bins_of, fill_den
 from stseg.baselines.kim_davis_2006.filter import estimate, particle_weights, resampled
 from stseg.baselines.kim_davis_2006.likelihood import NEUTRAL, add_misfit
 from stseg.baselines.kim_davis_2006.search import search
-from stseg.baselines.kim_davis_2006.segmentation import UNASSIGNED, Canvas, fill_unoccluded, segment
+from stseg.baselines.kim_davis_2006.segmentation import NO_PERSON, Canvas, fill_unoccluded, segment
 from stseg.baselines.kim_davis_2006.tracker import ParticleTracker
 from stseg.baselines.kim_davis_2006.views import ParticleView
 from stseg.config import Config, ParticleConfig
@@ -141,7 +141,7 @@ def test_segmentation_is_equations_2_to_4(standing: Floats) -> None:
         assert canvas.label[v, u] == label or share == pytest.approx(0.5, abs=0.05)
         if label >= 0:
             assert canvas.best[v, u] / (canvas.total[v, u] + canvas.free[v, u]) == pytest.approx(share, abs=1e-3)
-    assert (canvas.label[foreground == 0] == UNASSIGNED).all()
+    assert (canvas.label[foreground == 0] == NO_PERSON).all()
 
 
 def test_boxes_hold_all_that_a_body_may_cover() -> None:
@@ -170,8 +170,8 @@ def test_what_is_open_is_in_front() -> None:
     ideal = raster(CAMERA, 2)
     bodies, shape = bodies_of(CAMERA, standing), ideal.shape[:2]
     owner, lone, free = (
-        np.full(shape, UNASSIGNED, np.int32),
-        np.full(shape, UNASSIGNED, np.int32),
+        np.full(shape, NO_PERSON, np.int32),
+        np.full(shape, NO_PERSON, np.int32),
         np.zeros(shape, np.float32),
     )
     seen, alone, boxes = np.zeros(2, np.int64), np.zeros(1, np.int64), plain.boxes_everywhere(2, shape)

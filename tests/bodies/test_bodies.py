@@ -11,7 +11,7 @@ from strategies import numbers
 
 from stseg.arrays import Floats
 from stseg.bodies.outlines import outlines
-from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable
+from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable, fill_discs
 from stseg.geometry import Camera, Grid
 
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
@@ -41,7 +41,9 @@ def test_a_box_is_that_of_the_bodys_points(view: str, x: float, y: float, height
 
 @given(x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(1.3, 2.0))
 def test_discs_are_rings_of_the_body(x: float, y: float, height: float) -> None:
-    discs = TABLES["ideal"].discs(np.array([x, y]), height)
+    table, discs = TABLES["ideal"], np.empty((len(PROFILE), 6))
+    column, row = (np.array([x, y]) - table.origin) / table.step
+    fill_discs(table, column, row, height, PROFILE, discs)
     for (share, radius), disc in zip(PROFILE, discs, strict=True):
         points = ring(np.array([x, y, height]), share, radius, points=64)
         pixel, _ = VIEWS["ideal"].project(points[:, :2], points[:, 2])

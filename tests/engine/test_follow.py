@@ -21,7 +21,7 @@ from scenes import walkers
 import stseg.engine.live.following
 from stseg.arrays import Rows
 from stseg.commands.main import main
-from stseg.engine.live.following import ENDLESS, last_frame
+from stseg.engine.live.following import last_frame
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
@@ -30,6 +30,7 @@ from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.records.tables import CORRECTION, TRAJECTORY
+from stseg.tracking.windows.windows import ENDLESS
 from stseg.trajectories.live_ids import LiveCorrections, LiveIds, corrected_ids
 
 PROGRAM = """

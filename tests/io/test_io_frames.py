@@ -17,7 +17,7 @@ from refusals import refused
 
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError, StsegError
-from stseg.io.recording.aligned_stream import StreamIndex, count_frames, index_streams
+from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.frames import FrameSet, open_frames, read_background, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
 
@@ -92,7 +92,7 @@ def test_each_kind_gives_its_array(
             assert view.dtype == dtype
             assert (view == 10 * frame_set.frame).all()
     assert frame_set.frame == 2
-    assert count_frames(rec) == 3
+    assert index_streams(rec).length == 3
 
 
 def test_all_kinds_together(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_frames_are_counted_by_decoding(tmp_path: Path) -> None:
     path.write_bytes(data)
     assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 7
     rec = blank_recording(CameraSource(Source("video", path)))
-    assert count_frames(rec) == 5
+    assert index_streams(rec).length == 5
     assert len(shown(rec)) == 5
 
 
@@ -138,7 +138,7 @@ def test_a_frame_without_boxes_is_no_blind_view(tmp_path: Path) -> None:
 def test_offsets_align_cameras(tmp_path: Path) -> None:
     early, late = box_camera(tmp_path, 6, offset=-2), box_camera(tmp_path, 3, offset=1)
     assert shown(blank_recording(early, late), first=1) == [(1, 3, 0), (2, 4, 1), (3, 5, 2)]
-    assert count_frames(blank_recording(early, late)) == 4
+    assert index_streams(blank_recording(early, late)).length == 4
 
 
 def test_a_late_camera_is_an_error_or_blind(tmp_path: Path) -> None:
@@ -159,13 +159,13 @@ def test_a_short_camera_is_an_error_or_blind(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match=reported), open_frames(blank_recording(whole, short)) as reader:
         seen.extend(reader)
     assert [frame_set.frame for frame_set in seen] == [0, 1]
-    refused(SourceError, reported, count_frames, blank_recording(whole, short))
+    refused(SourceError, reported, index_streams, blank_recording(whole, short))
     for stop in (None, 4):
         refused(SourceError, reported, shown, blank_recording(whole, short), 3, stop)
     assert shown(blank_recording(whole, short), 0, 2) == [(0, 0, 0), (1, 1, 1)]
     rec = blank_recording(whole, box_camera(tmp_path, 2, blind=True))
     assert shown(rec) == [(0, 0, 0), (1, 1, 1), (2, 2, None), (3, 3, None)]
-    assert count_frames(rec) == 4
+    assert index_streams(rec).length == 4
 
 
 def test_a_recording_ends_with_its_required_cameras(tmp_path: Path) -> None:
@@ -173,7 +173,7 @@ def test_a_recording_ends_with_its_required_cameras(tmp_path: Path) -> None:
     assert [row[0] for row in shown(rec)] == [0, 1]
     both_blind = blank_recording(box_camera(tmp_path, 2, blind=True), box_camera(tmp_path, 5, blind=True))
     assert shown(both_blind, 3) == [(3, None, 3), (4, None, 4)]
-    assert count_frames(both_blind) == 5
+    assert index_streams(both_blind).length == 5
 
 
 @pytest.mark.parametrize("blind", [False, True])
@@ -303,7 +303,7 @@ def test_real_silhouettes_and_boxes() -> None:
         for folder in folders
     ]
     rec = blank_recording(*cameras, size=(644, 486))
-    assert count_frames(rec) == 272
+    assert index_streams(rec).length == 272
     with open_frames(rec, 270) as reader:
         frame_sets = list(reader)
     assert [frame_set.frame for frame_set in frame_sets] == [270, 271]
@@ -383,4 +383,4 @@ def test_one_camera_by_itself(hour: Path) -> None:
 
 
 def test_a_pattern_of_no_videos(tmp_path: Path) -> None:
-    refused(SourceError, "no files", count_frames, camera_of(tmp_path / "hour_*.mp4"))
+    refused(SourceError, "no files", index_streams, camera_of(tmp_path / "hour_*.mp4"))

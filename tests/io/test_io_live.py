@@ -21,7 +21,7 @@ from stseg.io.live.arriving_files import ArrivingFiles, FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
 from stseg.io.live.live_stream import Capture, is_live, now
-from stseg.io.recording.aligned_stream import count_frames
+from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.frames import FrameSet, open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
@@ -82,7 +82,7 @@ def _later(halt: Event, seconds: float) -> None:
 
 def test_files_that_arrive_show_what_they_show_afterwards(arriving: Path, tmp_path: Path) -> None:
     recording = read_recording(arriving)
-    assert count_frames(recording) == FRAMES
+    assert index_streams(recording).length == FRAMES
     for first in (0, 13):
         notes = FileNotes(tmp_path / "files.json")
         with open_frames(recording, first) as after, followed(arriving, first, FRAMES, notes, print) as frame_sets:
@@ -288,7 +288,7 @@ def test_an_address_in_the_rig_file(tmp_path: Path) -> None:
     assert "secret" not in provenance.rig + str(provenance.sources)
     assert "rtsp://me:***@there:554/live?channel=1" in provenance.rig
     with pytest.raises(SourceError, match="--follow") as error:
-        count_frames(recording)
+        index_streams(recording)
     assert "secret" not in str(error.value)
     with pytest.raises(RigError, match="one address"):
         parse_rig(text.replace('kind = "video"', 'kind = "masks"'), path)

@@ -25,7 +25,7 @@ from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
-from stseg.occupancy.shown_cells import SIDE, CellTables, ShownCells
+from stseg.occupancy.shown_cells import BLOCK_SIDE, CellTables, ShownCells
 from stseg.occupancy.volume import Occupancy
 from stseg.records.people import Explanation
 
@@ -398,7 +398,7 @@ def test_the_same_frame_twice() -> None:
 
 def test_cells_kept_from_the_frame_before_are_those_of_this_one() -> None:
     occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
-    kept, marked = CellTables(occupancy.sampling.footprint), occupancy.views[:, ::SIDE, ::SIDE] < 0
+    kept, marked = CellTables(occupancy.sampling.footprint), occupancy.views[:, ::BLOCK_SIDE, ::BLOCK_SIDE] < 0
     assert marked.size > 1
     for block in (0, 0, -1, 0):
         marked[:] = False

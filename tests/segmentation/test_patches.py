@@ -12,7 +12,7 @@ from scenes import CONFIG, found, people, room
 from stseg.arrays import Floats
 from stseg.geometry import Grid
 from stseg.records.sparse_volume import SparseVolume
-from stseg.segmentation.patches import SIDE, GroundPatches, mark_places, no_squares, people_squares
+from stseg.segmentation.patches import SQUARE_SIDE, GroundPatches, mark_places, no_squares, people_squares
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 
@@ -87,7 +87,9 @@ def test_patches_are_apart_and_hold_what_is_marked() -> None:
         grown = held.reshape(GRID.shape[1:])
         for place in places:
             y, x = divmod(int(place), GRID.shape[2])
-            assert grown[max(y - SIDE, 0) : y + SIDE + 1, max(x - SIDE, 0) : x + SIDE + 1].all()
+            assert grown[
+                max(y - SQUARE_SIDE, 0) : y + SQUARE_SIDE + 1, max(x - SQUARE_SIDE, 0) : x + SQUARE_SIDE + 1
+            ].all()
         np.testing.assert_array_equal(patches.on_ground(patches.on_sheet(grown)), grown)
         edge = patches.on_ground(patches.border)
         beside = np.pad(grown, 1, constant_values=1)

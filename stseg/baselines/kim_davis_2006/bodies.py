@@ -17,13 +17,13 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
 from stseg.bodies.pillars import PROFILE
+from stseg.geometry.rig import BODY_HEIGHT
 from stseg.kernels.accelerate import kernel, part
 
 PARTS = np.array([0.47, 0.84, 10.0])
 """Where legs, trunk and head end, relative to the height."""
-_ADULT = 1.70
 _LEVELS = 32
-HALF_WIDTH = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, PROFILE[:, 0], PROFILE[:, 1] / _ADULT)
+HALF_WIDTH = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, PROFILE[:, 0], PROFILE[:, 1] / BODY_HEIGHT)
 """W by relative height, float64 (level,)."""
 LOOSENESS = 0.025
 """Scale of the logistic distribution of W: clothes, strides, and the error of a foreground's edge."""

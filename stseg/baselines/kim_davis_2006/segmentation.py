@@ -16,7 +16,7 @@ from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
 from stseg.baselines.kim_davis_2006.bodies import occupancy, part_at, placed
 from stseg.kernels.accelerate import kernel
 
-UNASSIGNED = -1
+NO_PERSON = -1
 
 
 class Canvas(NamedTuple):
@@ -41,7 +41,7 @@ class Canvas(NamedTuple):
     def of(cls, rows: int, columns: int) -> Canvas:
         """An empty canvas."""
         shape = rows, columns
-        return cls(np.full(shape, UNASSIGNED, np.int32), *(np.zeros(shape, np.float32) for _ in range(3)))
+        return cls(np.full(shape, NO_PERSON, np.int32), *(np.zeros(shape, np.float32) for _ in range(3)))
 
 
 @kernel
@@ -50,7 +50,7 @@ def clear(boxes: Ints, canvas: Canvas) -> None:
     for k in range(len(boxes)):
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
-                canvas.label[v, u], canvas.best[v, u], canvas.total[v, u], canvas.free[v, u] = UNASSIGNED, 0.0, 0.0, 1.0
+                canvas.label[v, u], canvas.best[v, u], canvas.total[v, u], canvas.free[v, u] = NO_PERSON, 0.0, 0.0, 1.0
 
 
 @kernel
@@ -91,7 +91,7 @@ def segment(
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
                 if canvas.free[v, u] > canvas.best[v, u]:
-                    canvas.label[v, u] = UNASSIGNED
+                    canvas.label[v, u] = NO_PERSON
 
 
 @kernel
@@ -113,7 +113,7 @@ def fill_unoccluded(
     for k in range(len(boxes)):
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
-                free[v, u], owner[v, u] = 1.0, UNASSIGNED
+                free[v, u], owner[v, u] = 1.0, NO_PERSON
     for k in order:
         unoccluded[k] = 0
         for v in range(boxes[k, 0], boxes[k, 1]):

@@ -15,7 +15,7 @@ from stseg.baselines.kim_davis_2006.axes import fill_axes
 from stseg.baselines.kim_davis_2006.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
 from stseg.baselines.kim_davis_2006.colours import FALL, bins_of, fill_density, normalised
 from stseg.baselines.kim_davis_2006.likelihood import add_misfit
-from stseg.baselines.kim_davis_2006.segmentation import UNASSIGNED, Canvas, fill_unoccluded, segment
+from stseg.baselines.kim_davis_2006.segmentation import NO_PERSON, Canvas, fill_unoccluded, segment
 from stseg.geometry import Camera
 
 _WIDTHS = 2 * float(HALF_WIDTH.mean())
@@ -135,7 +135,7 @@ class ParticleFrame:
         Occluded people are not updated; a part that has a model is updated only from pixels segmented as the person.
         """
         view, (bodies, order) = self.view, self.segment(ground)
-        owner = np.full(self.foreground.shape, UNASSIGNED, np.int32)
+        owner = np.full(self.foreground.shape, NO_PERSON, np.int32)
         unoccluded = np.zeros(len(ground), np.int64)
         fill_unoccluded(bodies, order, self.boxes, view.ideal, HALF_WIDTH, PARTS, view.pixel_buffer, owner, unoccluded)
         whole = unoccluded >= _VISIBLE * view.areas.sum() * (bodies[:, 2:4] ** 2).sum(1)

@@ -13,7 +13,7 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats, Ints, Singles
 
-_MIN_LIKELIHOOD = 0.8
+SILHOUETTE_LIKELIHOOD = 0.8
 """Foreground likelihood of a silhouette's pixels, at least."""
 _MIN_AREA, _MIN_LENGTH = 1.5e-3, 0.10
 """Least area and length of a person, shares of the image's area and height."""
@@ -76,7 +76,7 @@ def upright_endpoints(likelihood: Singles) -> Floats:
     float64 (n, 2, 2)
         Foot and head (u, v), pixels.
     """
-    mask = cv2.medianBlur((likelihood > _MIN_LIKELIHOOD).astype(np.uint8), 5)
+    mask = cv2.medianBlur((likelihood > SILHOUETTE_LIKELIHOOD).astype(np.uint8), 5)
     count, label, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     found = [_endpoints(label, stats, k) for k in range(1, count) if _may_be_person(stats, k, label.shape)]
     kept = [endpoints for endpoints in found if endpoints is not None]

@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.box_correspondence import (
-    GATE,
+    MATCH_GATE,
     BoxCorrespondences,
     concatenated,
     match_boxes,
@@ -97,7 +97,7 @@ def _fitting_boxes(tables: Sequence[BodyTable], people: BoxCorrespondences) -> i
         )
         with np.errstate(invalid="ignore"):
             off = np.hypot(residual[:, 0], residual[:, 1]) / pixel_height
-            count += int((uncut[:, :2].all(axis=1) & (off < _FIT_DISTANCE * GATE)).sum())
+            count += int((uncut[:, :2].all(axis=1) & (off < _FIT_DISTANCE * MATCH_GATE)).sum())
     return count
 
 

@@ -15,11 +15,12 @@ from scipy import ndimage
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.bodies.pillars import BodyTable
+from stseg.calibration.automatic.endpoints import SILHOUETTE_LIKELIHOOD
 from stseg.geometry import Camera, Grid, Rig
 from stseg.geometry.rig import BODY_HEIGHT
 
 _MIN_HEIGHT, _MAX_HEIGHT = 1.35, 2.10
-GATE = 0.35
+MATCH_GATE = 0.35
 """Association gate: distance of a box's middle and top from the body's, in body heights (about 0.6 m)."""
 _OCCLUSION = 0.6
 """Share of a body's height that may be hidden at the feet."""
@@ -116,8 +117,8 @@ def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) ->
         top = np.abs(body[:, None, 1] - boxes[None, :, 1]) / pixel_height
         early = (body[:, None, 3] - boxes[None, :, 3]) / pixel_height
         widths = (boxes[:, 2] - boxes[:, 0])[None] / wide
-        off = np.hypot(middle, top) / GATE
-        fits = (off < 1) & (early < _OCCLUSION) & (early > -GATE) & (widths > _MIN_WIDTH) & (widths < _MAX_WIDTH)
+        off = np.hypot(middle, top) / MATCH_GATE
+        fits = (off < 1) & (early < _OCCLUSION) & (early > -MATCH_GATE) & (widths > _MIN_WIDTH) & (widths < _MAX_WIDTH)
         # Head and sides are inside the image.
         inside = (body[:, :2] > 0).all(axis=1) & (body[:, 2] < table.size[0] - 1) & (body[:, 1] < table.size[1] - 1)
     return np.where(fits & inside[:, None], off, np.inf)
@@ -183,8 +184,6 @@ def _greedy_selection(residual: Floats, which: Ints) -> list[tuple[int, Ints]]:
         score[best] = 0
 
 
-_MIN_LIKELIHOOD = 0.8
-"""Least foreground likelihood of a blob's pixels."""
 _MIN_AREA = 0.0006
 """Least area of a blob, share of the image's area."""
 _MIN_FILL = 0.25
@@ -210,7 +209,7 @@ def isolated_boxes(evidence: Boxes | Singles | None, size: tuple[int, int]) -> F
         return np.zeros((0, 4))
     if isinstance(evidence, Boxes):
         return np.concatenate([evidence.pixel[:, :2], evidence.pixel[:, :2] + evidence.pixel[:, 2:]], axis=1)
-    labels, count = ndimage.label(evidence > _MIN_LIKELIHOOD, np.ones((3, 3)))
+    labels, count = ndimage.label(evidence > SILHOUETTE_LIKELIHOOD, np.ones((3, 3)))
     found = []
     areas = np.bincount(labels.ravel(), minlength=count + 1)[1:]
     for area, window in zip(areas.tolist(), ndimage.find_objects(labels), strict=True):

@@ -7,13 +7,12 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera
+from stseg.geometry.rig import CAMERA_HEIGHTS
 
 MIN_POINTS = 4
 """Least number of ground points of a homography."""
 _COLLINEAR_RATIO = 0.02
 """Ratio of width to length of a point set below which it counts as collinear."""
-CAMERA_HEIGHTS = (0.3, 60.0)
-"""Plausible camera heights, metres."""
 
 
 def require_ground(name: str, ground: Floats, pixel: Floats) -> None:

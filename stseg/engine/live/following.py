@@ -39,9 +39,7 @@ from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.kernels.accelerate import compilation_noted
-
-ENDLESS = 1 << 62
-"""Stop frame of a run of unknown length."""
+from stseg.tracking.windows.windows import ENDLESS
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from stseg.arrays import AnyArray, Bytes, Flags, Floats, Ints
 from stseg.reporting.pictures.colours import PAPER, Colour
 
+MAX_LABELS = 24
+"""Tracks that are labelled in a picture: the longest ones."""
 _SHIFT = 4  # fractional bits of OpenCV's coordinates
 _CAPITALS = 22.0  # height in pixels of OpenCV's capitals at scale 1
 _FONT = cv2.FONT_HERSHEY_SIMPLEX

@@ -10,14 +10,13 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
-from stseg.reporting.pictures.canvas import chips, dashes, disc, fill, outline, stroke, text, text_size
+from stseg.reporting.pictures.canvas import MAX_LABELS, chips, dashes, disc, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed, track_colour
 from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
 _CAMERA_DISTANCE = 0.45  # cameras within this share of the ground's longer side are shown where they stand
 _UNSEEN_TONE: Colour = (206, 199, 195)  # seen by no view
 _TRUTH_COLOUR: Colour = (84, 76, 70)
-_MAX_LABELS = 24  # tracks, the longest ones
 
 
 def plan_view(
@@ -217,7 +216,7 @@ def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> Non
 
 def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str]) -> None:
     """Ids beside the ends; of many tracks only the longest."""
-    paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:_MAX_LABELS]
+    paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:MAX_LABELS]
     size = 14.0 if len(paths) <= 12 else 11.0
     ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
     labels = [names.get(identity, str(identity)) for identity, _ in paths]

@@ -9,13 +9,12 @@ from numpy.typing import ArrayLike
 
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Grid
-from stseg.reporting.pictures.canvas import blank, chips, disc, fill, outline, stroke, text
+from stseg.reporting.pictures.canvas import MAX_LABELS, blank, chips, disc, fill, outline, stroke, text
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Picture, mixed, track_colour
 from stseg.reporting.pictures.plan_map import step_for
 
 _AZIMUTH, _ELEVATION = np.radians(-32.0), np.radians(32.0)
 _MARGIN, _PIECE_POINTS, _MAX_PIECES = 88, 6, 6000
-_MAX_LABELS = 24
 
 
 def spacetime_picture(
@@ -184,7 +183,7 @@ def _draw_threads(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
 
 def _label(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
     """Ids at the upper ends; of many threads only the longest."""
-    longest = sorted(threads, key=lambda thread: -len(thread.places))[:_MAX_LABELS]
+    longest = sorted(threads, key=lambda thread: -len(thread.places))[:MAX_LABELS]
     ends = np.array([block.pixel(thread.places[-1]) for thread in longest]).reshape(-1, 2)
     ids, (tall, wide) = [thread.identity for thread in longest], canvas.shape[:2]
     chips(canvas, ends, [*map(str, ids)], map(track_colour, ids), 14, (4, 4, wide - 4, tall - 4))

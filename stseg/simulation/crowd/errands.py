@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
-MARGIN = 0.9
+_OUTSIDE_MARGIN = 0.9
 """Distance outside the area at which pedestrians appear and disappear, metres."""
 _GOAL_MARGIN = 0.45  # metres that goals keep from the area's border
 _GOAL_TIME = 7.0  # seconds after which an unreached goal is replaced
@@ -56,7 +56,7 @@ class Errand:
 
     def is_over(self, ground: Floats) -> bool:
         """Whether the person has left the scene."""
-        return self.leaves and bool((np.abs(ground) > self.half + MARGIN - 0.05).any())
+        return self.leaves and bool((np.abs(ground) > self.half + _OUTSIDE_MARGIN - 0.05).any())
 
     def facing(self, ground: Floats) -> float | None:
         """Direction a waiting pedestrian faces, radians; None for no change."""
@@ -147,7 +147,7 @@ class Planner:
         side, along = int(self._rng.integers(4)), self._rng.uniform(-0.6, 0.6)
         axis, sign = side % 2, 1 - 2 * (side // 2)
         place = np.empty(2)
-        place[axis] = sign * (self._half[axis] + MARGIN)
+        place[axis] = sign * (self._half[axis] + _OUTSIDE_MARGIN)
         place[1 - axis] = along * self._half[1 - axis]
         return place
 

@@ -11,9 +11,6 @@ from stseg.arrays import Floats
 from stseg.simulation.rendering.body import PARTS
 from stseg.simulation.scene import Topic, random_stream
 
-PAINT = 10
-"""Numbers a part: two colours (blue, green, red, 0..255), then the pattern's steps ahead, aside and along the part,
-within its half axes, and their offset along it. The second colour is where the sum of the steps is odd."""
 _SKIN = ((150, 175, 215), (120, 150, 200), (85, 115, 165), (50, 70, 110), (140, 165, 225))
 _HAIR = ((25, 25, 30), (30, 45, 70), (60, 100, 140), (110, 170, 205), (130, 130, 135), (20, 35, 90))
 
@@ -24,7 +21,11 @@ _OWN_TONE = 0.2
 
 @lru_cache(maxsize=1024)
 def own_clothing(seed: int, person: int) -> Floats:
-    """Paint of one person's parts, float64 (part, PAINT); see `PAINT`."""
+    """Paint of one person's parts, float64 (part, 10).
+
+    Two colours (blue, green, red, 0..255), then the pattern's steps ahead, aside and along the part, within its half
+    axes, and their offset along it. The second colour is where the sum of the steps is odd.
+    """
     rng = random_stream(seed, Topic.CLOTHES, person)
     skin, hair = _SKIN[int(rng.integers(len(_SKIN)))], _HAIR[int(rng.integers(len(_HAIR)))]
     shirt, trousers = _pattern(rng), _pattern(rng)

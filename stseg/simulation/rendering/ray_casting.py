@@ -69,8 +69,8 @@ def draw_bodies(
         See `pixel_boxes`.
     centre, form
         Of the ellipsoids, float64 (n, part, 3) and (n, part, 3, 3), see `stseg.simulation.rendering.body.Bodies`.
-    paint : float64 (n, part, PAINT)
-        See `stseg.simulation.rendering.clothes.PAINT`.
+    paint : float64 (n, part, 10)
+        See `stseg.simulation.rendering.clothes.own_clothing`.
     lamp : float64 (3,)
         Unit vector towards the light.
     ids : uint16 (n,)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from stseg.config import TrackingConfig
 
 SHORTEST, LONGEST = 8, 30
+ENDLESS = 1 << 62
+"""Stop frame of a run without a known end."""
 
 
 @dataclass(frozen=True)
