@@ -83,7 +83,7 @@ def _text(estimate: Forecast, recording: Recording) -> str:
             f"recording   {estimate.frames} frames, {_span(hours * 3600)}, in {estimate.segments} segments",
             f"run         {_span(estimate.seconds)} with {estimate.workers} workers, a core each",
             f"work        {parts}",
-            f"run file    {size:.0f} MiB, {size / hours:.0f} MiB an hour; as much again beside it until it stands",
+            f"run file    {size:.0f} MiB, {size / hours:.0f} MiB an hour; temporary files need the same space again",
         ]
     )
 

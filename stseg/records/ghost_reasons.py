@@ -65,5 +65,5 @@ def ghost_reasons(candidates: Rows) -> GhostReasons:
 
 
 def has_evidence(parts: AnyArray) -> Flags:
-    """Where a view's evidence speaks for or against a candidate, bool of the same shape."""
+    """Whether a view has evidence for or against a candidate, bool of the same shape."""
     return np.asarray(np.abs(parts) >= _EXPRESSIVE)

@@ -71,9 +71,9 @@ def final_tracks(
     least = config.tracking.return_probability
     if least == 1:
         return whole
-    whole = _above(whole, int(known_people["id"].max(initial=0)))
+    whole = _with_later_ids(whole, int(known_people["id"].max(initial=0)))
     returns = returns_of(problem, whole.identity, bridged, least, constraints, known_people)
-    return _under_people(whole, returns, frame_rate)
+    return _with_returns(whole, returns, frame_rate)
 
 
 def _kept(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Ints, Rows]:
@@ -83,8 +83,8 @@ def _kept(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[
     return np.unique(kept["id"]), np.concatenate([short, ghosts])
 
 
-def _above(whole: FinalTracks, last_id: int) -> FinalTracks:
-    """Tracks under ids above another."""
+def _with_later_ids(whole: FinalTracks, last_id: int) -> FinalTracks:
+    """The tracks under ids greater than `last_id`."""
     trajectory, events = whole.trajectory.copy(), whole.events.copy()
     trajectory["id"] += last_id
     for role in ("id", "other"):
@@ -92,8 +92,8 @@ def _above(whole: FinalTracks, last_id: int) -> FinalTracks:
     return FinalTracks(trajectory, events, whole.identity + last_id * (whole.identity > 0))
 
 
-def _under_people(whole: FinalTracks, returns: Sequence[Return], frame_rate: float) -> FinalTracks:
-    """Tracks of which some are visits of one person."""
+def _with_returns(whole: FinalTracks, returns: Sequence[Return], frame_rate: float) -> FinalTracks:
+    """The tracks under the ids of people: visits of one person have one id."""
     trajectory = renamed_trajectory(whole.trajectory, returns)
     events = renamed_events(whole.events, trajectory, returns, frame_rate)
     return FinalTracks(trajectory, events, renamed_ids(whole.identity, returns))

@@ -6,10 +6,10 @@
 
 M_i is the image of the pillar of height h and width r at X (eq. 4), F_i the likelihood of foreground inside the image
 and e outside it (eq. 2): the rate at which people are out of a view. Here the product is taken over the ratios p(F_i |
-X) / level, the level being the share of a pillar that must show foreground for the view to speak for somebody. A view
-that does not see the pillar at all has ratio 1, so places in different numbers of views compare. (The paper has e for
-such a view, as if the level were e: then every place with a little foreground is a sample, and clutter makes
-candidates.) p(F_i | X) is at least the rate at which a view misses a whole person, so that one blind view has no veto.
+X) / level, the level being the share of a pillar above which its foreground is evidence for a person. A view that
+does not see the pillar at all has ratio 1, so places in different numbers of views compare. (The paper has e for such a
+view, as if the level were e: then every place with a little foreground is a sample, and clutter makes candidates.)
+p(F_i | X) is at least the rate at which a view misses a whole person, so that one blind view has no veto.
 p(X) is uniform over the area.
 """
 
@@ -28,7 +28,7 @@ from stseg.geometry.grid import inside_polygon
 from stseg.geometry.summed_area import TOP_LEVEL, SummedArea, fill_summed_area, sum_of
 from stseg.kernels.accelerate import kernel
 
-_WITHIN = 2.0
+_LATTICE_RANGE = 2.0
 """Range of the lattice of heights and widths, standard deviations; the paper's range is illegible."""
 _PIXEL_BOUND = 1e6
 """Pixels; nothing farther outside an image matters."""
@@ -78,7 +78,7 @@ class DetectionProbability:
         Returns
         -------
         float64 (y, x)
-            Nats: above 0 where the views together speak for a person; -inf outside the area.
+            Nats: above 0 where the views together are evidence for a person; -inf outside the area.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class DetectionProbability:
 
 def _lattice(mean: float, spread: float, number: int) -> tuple[Floats, Floats]:
     """Sizes around the mean and their Gaussian shares, which sum to 1."""
-    steps = np.linspace(-_WITHIN, _WITHIN, number)
+    steps = np.linspace(-_LATTICE_RANGE, _LATTICE_RANGE, number)
     weight = np.exp(-0.5 * steps**2)
     return mean + spread * steps, weight / weight.sum()
 

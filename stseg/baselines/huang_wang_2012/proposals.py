@@ -119,7 +119,7 @@ def marginal(volume: Singles) -> Floats:
     Returns
     -------
     float64 (y, x)
-        Mean of what speaks for a cell over the planes, nats; 0 where too few of them are filled.
+        Mean over the planes of the evidence for a cell, nats; 0 where too few of them are filled.
     """
     above = np.nan_to_num(volume.astype(float), nan=0.0).clip(0.0)
     return np.asarray(np.where((above > 0).mean(0) >= _FILLED, above.mean(0), 0.0))

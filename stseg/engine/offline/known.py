@@ -46,7 +46,7 @@ def read_known(path: Path, config: Config) -> Rows:
 
 
 def rows_with_ids(run: Run) -> Rows:
-    """Committed rows with the ids of the run's tracks, 0 for none; tracks keep the places of their rows as raw ones."""
+    """Committed rows with the ids of the run's tracks, 0 for none; rows of tracks keep the raw places."""
     rows = run.committed.copy()
     rows["id"] = 0
     tracked, committed = (_places(table) for table in (run.trajectory, run.committed))
