@@ -1,30 +1,23 @@
 """A small recording that arrives: what a recorder's folder and live cameras show of three walkers, piece by piece."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Thread
 
-import cv2
 import numpy as np
-from scenes import looking, mask, rig_of, standing_at, walkers
+from films import write_at_rate
+from recordings import FRAMES, PLACES, filmed_rig
+from scenes import mask, standing_at, walkers
 
 from stseg.arrays import AnyArray, Bytes
 from stseg.geometry import Rig
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 
-FRAMES, PIECE = 40, 10
-"""Frames of the recording, and of each of its files."""
-PLACES = {"west": (-3.5, -3.5, 2.6), "east": (3.5, -3.4, 2.6), "north": (0.0, 3.6, 2.6)}
-
-
-def filmed_rig() -> Rig:
-    """The room under three cameras."""
-    return rig_of([looking(name, place) for name, place in PLACES.items()])
+PIECE = 10
+"""Frames of each of its files."""
 
 
 def films(rig: Rig, frames: int = FRAMES) -> list[list[Bytes]]:
@@ -44,24 +37,15 @@ def empty_scene(size: tuple[int, int]) -> Bytes:
     return np.stack([170 + 20 * np.sin(u / 9 + k) + 10 * np.cos(v / 7) for k in range(3)], -1).astype(np.uint8)
 
 
-def write_video(path: Path, pictures: list[Bytes]) -> None:
-    """Motion JPEG, as cheap recorders write it."""
-    height, width = pictures[0].shape[:2]
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 8.0, (width, height))
-    for picture in pictures:
-        writer.write(picture)
-    writer.release()
-
-
 def write_pieces(folder: Path, *, empty: bool) -> Path:
     """The recording in pieces below `folder`/pieces, to arrive in `folder`/in; its rig file."""
     rig, pieces = filmed_rig(), folder / "pieces"
     pieces.mkdir()
     (folder / "in").mkdir()
     for camera, film in zip(rig.cameras, films(rig), strict=True):
-        write_video(folder / f"{camera.name}_empty.avi", [empty_scene(camera.size)] * 4)
+        write_at_rate(folder / f"{camera.name}_empty.avi", [empty_scene(camera.size)] * 4)
         for k in range(0, FRAMES, PIECE):
-            write_video(pieces / f"{camera.name}_{k // PIECE + 1}.avi", film[k : k + PIECE])
+            write_at_rate(pieces / f"{camera.name}_{k // PIECE + 1}.avi", film[k : k + PIECE])
     sources = tuple(
         CameraSource(
             Source("video", folder / "in" / f"{name}_*.avi"),
@@ -94,45 +78,8 @@ def meanwhile(work: Callable[[], object]) -> Thread:
 
 
 @dataclass
-class StandIn:
-    """A camera that can be opened like a live stream: it shows pictures by the clock, until it is told to break.
-
-    Attributes
-    ----------
-    pictures
-        What it shows, over and over.
-    period
-        Seconds from one to the next.
-    breaks
-        After how many pictures each of the streams that are opened breaks; the last one goes on.
-    refused
-        How often it cannot be opened after a break.
-    opened
-        When it was opened or refused.
-    begun
-        When it showed the first, by time.monotonic.
-    """
-
-    pictures: list[Bytes]
-    period: float
-    breaks: list[int] = field(default_factory=list)
-    refused: int = 0
-    opened: list[float] = field(default_factory=list)
-    begun: float = field(default_factory=time.monotonic)
-
-    def open(self, address: str, silence: float) -> _Shown:
-        """As `FFmpegCapture`."""
-        del address, silence
-        self.opened.append(time.monotonic())
-        if len(self.opened) > 1 and self.refused:
-            self.refused -= 1
-            raise OSError("nobody is there")
-        return _Shown(self, self.breaks.pop(0) if self.breaks else 1 << 60)
-
-
-@dataclass
 class _Shown:
-    camera: StandIn
+    camera: "StandIn"
     left: int
 
     def read(self) -> AnyArray | None:
@@ -143,3 +90,30 @@ class _Shown:
         return camera.pictures[number % len(camera.pictures)] if self.left >= 0 else None
 
     def close(self) -> None: ...
+
+
+@dataclass
+class StandIn:
+    """A camera that can be opened like a live stream: it shows pictures by the clock, until it is told to break."""
+
+    pictures: list[Bytes]
+    """What it shows, over and over."""
+    period: float
+    """Seconds from one to the next."""
+    breaks: list[int] = field(default_factory=list)
+    """After how many pictures each of the streams that are opened breaks; the last one goes on."""
+    refused: int = 0
+    """How often it cannot be opened after a break."""
+    opened: list[float] = field(default_factory=list)
+    """When it was opened or refused."""
+    begun: float = field(default_factory=time.monotonic)
+    """When it showed the first, by time.monotonic."""
+
+    def open(self, address: str, silence: float) -> _Shown:
+        """As `FFmpegCapture`."""
+        del address, silence
+        self.opened.append(time.monotonic())
+        if len(self.opened) > 1 and self.refused:
+            self.refused -= 1
+            raise OSError("nobody is there")
+        return _Shown(self, self.breaks.pop(0) if self.breaks else 1 << 60)

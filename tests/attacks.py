@@ -1,11 +1,9 @@
 """Parts of tests of hostile input: a small rig, a short film."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
-import cv2
 import numpy as np
+from films import write_at_rate
 
 RIG = """
 format = 1
@@ -36,8 +34,4 @@ def write_rig(folder: Path, old: str = "", new: str = "") -> Path:
 
 def film(path: Path, plain: Path) -> None:
     """A film of three frames; OpenCV writes it under a plain name."""
-    writer = cv2.VideoWriter(str(plain), cv2.VideoWriter.fourcc(*"MJPG"), 10, (64, 48))
-    for _ in range(3):
-        writer.write(np.zeros((48, 64, 3), np.uint8))
-    writer.release()
-    plain.rename(path)
+    write_at_rate(plain, [np.zeros((48, 64, 3), np.uint8)] * 3).rename(path)

@@ -1,7 +1,5 @@
 """A headless Chromium behind its DevTools pipe: its log, its requests, and the values of scripts."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os
@@ -21,21 +19,15 @@ _PATIENCE = 60.0  # seconds for one answer
 
 @dataclass
 class Page:
-    """An open page.
-
-    Attributes
-    ----------
-    complaints
-        Messages that the page logged, and uncaught exceptions.
-    requests
-        Addresses that it asked for, but for data: and its own.
-    """
+    """An open page."""
 
     process: subprocess.Popen[bytes]
     into: int
     out: int
     complaints: list[str] = field(default_factory=list)
+    """Messages that the page logged, and uncaught exceptions."""
     requests: list[str] = field(default_factory=list)
+    """Addresses that it asked for, but for data: and its own."""
     _session: str = ""
     _count: int = 0
     _rest: bytes = b""

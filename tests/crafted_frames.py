@@ -1,7 +1,5 @@
 """Crafted frames: the evidence of some candidates as arrays, for the score of a set and its search."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,14 +7,7 @@ import numpy as np
 import reference_core as reference
 
 from stseg.arrays import Floats, Ints
-from stseg.detection.problem import (
-    BoxEvidence,
-    DetectionProblem,
-    PixelEvidence,
-    RaggedArray,
-    ScoreParameters,
-    no_rows,
-)
+from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters, no_rows
 from stseg.detection.score.scoring import set_score
 from stseg.detection.search.best_set import ENUMERATION_LIMIT, find_best_set
 from stseg.kernels.accelerate import COMPILED

@@ -4,8 +4,6 @@ A wrapper counts the calls that write (open, write, fsync, rename, link, mkdir, 
 kills the process. `tests/attacks/test_faults.py` tries some calls, `tools/faults.py` all.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

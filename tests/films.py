@@ -1,15 +1,13 @@
 """Videos of three people as cameras deliver them: at any times, with time stamps, in one file or several."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 import cv2
 import numpy as np
-from scenes import FRAME_RATE, corner_cameras, mask, rig_of
+from scenes import FRAME_RATE, corner_cameras, mask, rig_of, three_people
 
 from stseg.arrays import Bytes, Floats
 from stseg.geometry import Camera
@@ -21,15 +19,7 @@ TICK = 1.0 / FRAME_RATE
 
 def standing(seconds: float) -> Floats:
     """x, y, height of three people who walk to and fro, metres, float64 (3, 3)."""
-    share = 1.0 - abs(1.0 - seconds / 6 % 2)
-    turn = np.pi * share
-    return np.array(
-        [
-            (-1.4 + 2.8 * share, -1.3, 1.7),
-            (1.4 - 2.8 * share, -0.4, 1.8),
-            (1.3 * np.cos(turn) + 0.1, 0.4 + 1.1 * np.sin(turn), 1.6),
-        ]
-    )
+    return np.asarray(three_people(np.array([1.0 - abs(1.0 - seconds / 6 % 2)]))[0])
 
 
 def regular(frames: int) -> Floats:
@@ -39,29 +29,20 @@ def regular(frames: int) -> Floats:
 
 @dataclass(frozen=True)
 class Film:
-    """Recording of one camera.
-
-    Attributes
-    ----------
-    seconds : float64 (n,)
-        When it takes its frames.
-    files
-        How many frames each of its files has; one with all of them where nothing is said.
-    suffix
-        Of its files: .mkv holds a stamp for each frame, .avi a rate for all.
-    starts
-        When each of them starts, seconds after the first.
-    source
-        Further keys of the rig file.
-    """
+    """Recording of one camera."""
 
     seconds: Floats
+    """When it takes its frames, float64 (n,)."""
     files: tuple[int, ...] = ()
+    """How many frames each of its files has; one with all of them where nothing is said."""
     suffix: str = ".mkv"
+    """Of its files: .mkv holds a stamp for each frame, .avi a rate for all."""
     starts: tuple[float, ...] = ()
+    """When each of them starts, seconds after the first."""
     source: CameraSource = field(default_factory=lambda: CameraSource(Source("masks", Path())))
+    """Further keys of the rig file."""
 
-    def with_source(self, offset: int = 0, blind: bool = False, clock: ClockSource = "auto") -> Film:
+    def with_source(self, offset: int = 0, blind: bool = False, clock: ClockSource = "auto") -> Self:
         """The same, with keys of its source in the rig file."""
         missing: Literal["blind", "error"] = "blind" if blind else "error"
         return replace(self, source=CameraSource(Source("masks", Path()), None, offset, missing, clock))
@@ -88,7 +69,7 @@ def write_films(folder: Path, films: Sequence[Film]) -> Path:
 def write_stamped(path: Path, pictures: Sequence[Bytes], seconds: Sequence[float]) -> None:
     """A video of pictures uint8 (v, u, 3) with these time stamps, kept in milliseconds."""
     plain = path.with_suffix(".plain.avi")
-    write_at_rate(plain, pictures, FRAME_RATE)
+    write_at_rate(plain, pictures)
     size, codec = pictures[0].shape[1::-1], cv2.VideoWriter.fourcc(*"MJPG")
     raw = [cv2.VIDEOWRITER_PROP_RAW_VIDEO, 1, cv2.VIDEOWRITER_PROP_KEY_INTERVAL, 1]
     packets = cv2.VideoCapture(str(plain), cv2.CAP_FFMPEG)
@@ -105,18 +86,19 @@ def write_stamped(path: Path, pictures: Sequence[Bytes], seconds: Sequence[float
     plain.unlink()
 
 
-def write_at_rate(path: Path, pictures: Sequence[Bytes], rate: float) -> None:
-    """A video of pictures uint8 (v, u, 3) at one rate, frames per second."""
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"MJPG"), rate, pictures[0].shape[1::-1])
+def write_at_rate(path: Path, pictures: Sequence[Bytes], rate: float = FRAME_RATE, codec: str = "MJPG") -> Path:
+    """A video of pictures uint8 (v, u, 3) at one rate, frames per second; its path."""
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), rate, pictures[0].shape[1::-1])
     assert writer.isOpened()
     for picture in pictures:
         writer.write(picture)
     writer.release()
+    return path
 
 
 def _write(path: Path, camera: Camera, seconds: Floats) -> None:
     pictures = [np.dstack([mask(camera, standing(time))] * 3) for time in seconds.tolist()]
     if path.suffix == ".avi":
-        write_at_rate(path, pictures, FRAME_RATE)
+        write_at_rate(path, pictures)
     else:
         write_stamped(path, pictures, (seconds - seconds[0]).tolist())

@@ -1,7 +1,5 @@
 """A small recording on disk, three walkers as boxes of three cameras, and how runs of it are made and compared."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -20,23 +18,35 @@ from stseg.io.recording.rig_text import format_rig
 from stseg.kernels.accelerate import COMPILED
 
 FRAMES = 40
+PLACES = {"west": (-3.5, -3.5, 2.6), "east": (3.5, -3.4, 2.6), "north": (0.0, 3.6, 2.6)}
 OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "detection.lattice_spacing=0.25")
 """Segments of six frames."""
 ALONE = ("--workers", "1")
 """In this process alone."""
 compiled_only = pytest.mark.skipif(not COMPILED, reason="too slow without a compiler")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-COMMAND = "import sys; from stseg.commands.main import main; sys.exit(main())"
+COMMAND = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
+from stseg.commands.main import main
+sys.exit(main())
+"""
 """The program, for a process of its own."""
+
+
+def started(program: str, *arguments: object, cwd: Path | None = None, **environment: str) -> subprocess.Popen[str]:
+    """A Python program in a process of its own."""
+    command, given = [sys.executable, "-c", program, *map(str, arguments)], {**ENVIRONMENT, **environment}
+    return subprocess.Popen(command, env=given, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def process(
     program: str, *arguments: object, cwd: Path | None = None, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """A Python program in a process of its own, at its end."""
-    command = [sys.executable, "-c", program, *map(str, arguments)]
-    given = {**ENVIRONMENT, **environment}
-    return subprocess.run(command, env=given, cwd=cwd, capture_output=True, text=True, check=False)
+    """The same at its end."""
+    with started(program, *arguments, cwd=cwd, **environment) as running:
+        printed = running.communicate()
+        return subprocess.CompletedProcess(running.args, running.returncode, *printed)
 
 
 def data_path(name: str) -> Path:
@@ -53,37 +63,51 @@ def blank_recording(*sources: CameraSource, size: tuple[int, int] = (16, 12), ra
     return Recording(Path("rig.toml"), Rig("test", rate, Grid((0, 1), (0, 1)), cameras), sources)
 
 
+def filmed_rig() -> Rig:
+    """The room under its three cameras."""
+    return rig_of([looking(name, place) for name, place in PLACES.items()])
+
+
 def write_recording(folder: Path) -> Path:
     """The recording, in a folder that exists; its rig file."""
-    places = {"west": (-3.5, -3.5, 2.6), "east": (3.5, -3.4, 2.6), "north": (0.0, 3.6, 2.6)}
-    rig = rig_of([looking(name, place) for name, place in places.items()])
-    lines = {name: ["frame,left,top,width,height"] for name in places}
-    for moment in box_frame_sets(rig, walkers(FRAMES), 0, FRAMES):
-        for name, view in zip(places, moment.views, strict=True):
+    rig = filmed_rig()
+    lines = {name: ["frame,left,top,width,height"] for name in PLACES}
+    for frame_set in box_frame_sets(rig, walkers(FRAMES), 0, FRAMES):
+        for name, view in zip(PLACES, frame_set.views, strict=True):
             assert isinstance(view, Boxes)
-            lines[name] += [f"{moment.frame},{','.join(map(repr, row))}" for row in view.pixel.tolist()]
+            lines[name] += [f"{frame_set.frame},{','.join(map(repr, row))}" for row in view.pixel.tolist()]
     for name, text in lines.items():
         (folder / f"{name}.csv").write_text("\n".join(text) + "\n")
-    streams = tuple(CameraSource(Source("boxes", folder / f"{name}.csv", 0, FRAMES)) for name in places)
+    streams = tuple(CameraSource(Source("boxes", folder / f"{name}.csv", 0, FRAMES)) for name in PLACES)
     path = folder / "rig.toml"
     path.write_text(format_rig(Recording(path, rig, streams), path))
     return path
 
 
-def track(rig: Path, output: Path, *more: str) -> int:
-    """The exit status of a run in short segments."""
-    return main(["run", str(rig), "-o", str(output), *OPTIONS, *(more if "--workers" in more else (*ALONE, *more))])
+def run_words(rig: Path, output: Path, *more: str, options: tuple[str, ...] = OPTIONS) -> list[str]:
+    """The command line of a run in short segments."""
+    return ["run", str(rig), "-o", str(output), *options, *(() if "--workers" in more else ALONE), *more]
+
+
+def track(rig: Path, output: Path, *more: str, options: tuple[str, ...] = OPTIONS) -> int:
+    """The exit status of that run."""
+    return main(run_words(rig, output, *more, options=options))
 
 
 def assert_same(one: Path, other: Path) -> None:
     """Every dataset but timings and provenance, bit for bit."""
     with h5py.File(one) as a, h5py.File(other) as b:
-        names: list[str] = []
+        names, others = list[str](), list[str]()
         a.visit(names.append)
+        b.visit(others.append)
+        assert names == others
         for name in names:
             if name.split("/")[0] in ("timings", "provenance"):
                 continue
-            assert name in b
             if isinstance(a[name], h5py.Dataset):
                 assert np.asarray(a[name][()]).tobytes() == np.asarray(b[name][()]).tobytes(), name
-            assert a[name].attrs.keys() == b[name].attrs.keys()
+            attributes = [
+                {key: str(value) for key, value in file[name].attrs.items() if key != "REFERENCE_LIST"}
+                for file in (a, b)
+            ]
+            assert attributes[0] == attributes[1], name

@@ -1,18 +1,16 @@
 """Belief propagation by definition: one particle, one pixel at a time, without the fast code's ideas."""
 
-from __future__ import annotations
-
 import colorsys
 
 import numpy as np
+from scipy.stats import multivariate_normal
 
 from stseg.arrays import Bytes, Floats
 
 
 def gaussian(off: Floats, covariance: Floats) -> float:
     """Density of a normal distribution in two dimensions."""
-    square = float(off @ np.linalg.inv(covariance) @ off)
-    return float(np.exp(-0.5 * square) / (2 * np.pi * np.sqrt(np.linalg.det(covariance))))
+    return float(multivariate_normal.pdf(off, cov=covariance))
 
 
 def mixture(place: Floats, centre: Floats, weight: Floats, covariance: Floats) -> Floats:

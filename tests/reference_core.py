@@ -1,13 +1,13 @@
 """The core stages by their definitions, one element at a time: slow, plain, without the fast code's ideas."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+from scipy.stats import multivariate_normal
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.bodies.box_fit import EDGE_GRAIN, TOLERANCE
@@ -25,10 +25,7 @@ def normal(off: float, variance: float) -> float:
 
 def normal_place(off: Floats, covariance: Floats) -> float:
     """Log-density of a normal distribution on the ground, nats."""
-    (xx, xy), (_, yy) = covariance
-    area = xx * yy - xy * xy
-    square = (yy * off[0] ** 2 - 2 * xy * off[0] * off[1] + xx * off[1] ** 2) / area
-    return float(-0.5 * square - math.log(2 * math.pi) - 0.5 * math.log(area))
+    return float(multivariate_normal.logpdf(off, cov=covariance))
 
 
 def best_pairs(gain: Floats) -> list[tuple[int, int]]:
@@ -46,20 +43,12 @@ def most_of_pairs(gain: Floats, row: int = 0, free: frozenset[int] | None = None
     return max([most_of_pairs(gain, row + 1, columns), *tried])
 
 
-def _around(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
-    """Cells of a plane and of a frame one cell wide around it."""
-    for v, u in np.ndindex(shape[0] + 2, shape[1] + 2):
-        yield v - 1, u - 1
-
-
 def away_from_border(open_to_people: Flags, cell: float) -> Floats:
     """Distance of each cell's centre to the nearest centre outside, less half a cell; metres, 0 outside."""
-    inside = {(int(v), int(u)) for v, u in zip(*np.nonzero(open_to_people), strict=True)}
-    outside = [place for place in _around(open_to_people.shape) if place not in inside]
-    away = np.zeros(open_to_people.shape)
-    for place in inside:
-        away[place] = (min(math.dist(place, other) for other in outside) - 0.5) * cell
-    return away
+    inside = np.pad(open_to_people, 1)
+    away = np.zeros(inside.shape)
+    away[inside] = (cdist(np.argwhere(inside), np.argwhere(~inside)).min(axis=1) - 0.5) * cell
+    return away[1:-1, 1:-1]
 
 
 def kalman(state: Floats, covariance: Floats, place: Floats, noise: Floats) -> tuple[Floats, Floats]:

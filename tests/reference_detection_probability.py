@@ -1,7 +1,5 @@
 """The detection probability and mean shift by their definitions, pixel by pixel and sample by sample: slow, plain."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

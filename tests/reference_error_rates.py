@@ -1,7 +1,5 @@
 """What a frame teaches of one view's rates by its definition, cell by cell: slow, plain."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Slow plain definitions of the scores: dictionaries, loops, and every possible matching tried."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

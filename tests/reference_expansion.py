@@ -1,7 +1,5 @@
 """Slow plain definitions of the many-label energy and its moves, with nothing of the code that they judge."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import product
 

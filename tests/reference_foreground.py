@@ -1,7 +1,5 @@
 """Slow plain definitions of the foreground stage, written from the formulas and sharing no code with it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Projection by other means: a 3x4 matrix, point by point, and OpenCV's own function."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

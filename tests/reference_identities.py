@@ -1,7 +1,5 @@
 """Plain twin of the identity search: every partition of a few rows into people, each scored as a whole."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 

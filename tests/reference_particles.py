@@ -1,7 +1,5 @@
 """KD06 pixel by pixel, as its equations stand, without rasters of people's neighbourhoods or running products."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np
@@ -49,14 +47,11 @@ def prior(camera: Camera, ground: Floats, height: Floats, pixel: Floats, k: int)
     return own * float(np.prod([1 - one for one in nearer]))
 
 
-def posterior(
-    camera: Camera, ground: Floats, height: Floats, pixel: Floats, likely: Floats
-) -> tuple[int, float]:  # fmt: skip
+def posterior(camera: Camera, ground: Floats, height: Floats, pixel: Floats, likely: Floats) -> tuple[int, float]:
     """Eq. 2: the likeliest person (-1 for a stranger) and their share, given P(x | k) float (n, part)."""
     places = [place(camera, g, h, pixel) for g, h in zip(ground, height, strict=True)]
-    joint = [
-        prior(camera, ground, height, pixel, k) * likely[k, part_of(places[k][0])] for k in range(len(ground))
-    ]  # fmt: skip
+    priors = [prior(camera, ground, height, pixel, k) for k in range(len(ground))]
+    joint = [own * likely[k, part_of(places[k][0])] for k, own in enumerate(priors)]
     nobody = float(np.prod([1 - covered(*one) for one in places]))
     best = int(np.argmax(joint))
     return (best if joint[best] >= nobody else -1), joint[best] / (sum(joint) + nobody)

@@ -1,7 +1,5 @@
 """Slow plain definitions of the pixel labels, straight from HW12 eqs 13 to 20."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

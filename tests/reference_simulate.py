@@ -1,7 +1,5 @@
 """Image of bodies and shadows by other means: every ray against every ellipsoid, no boxes, no kernels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles

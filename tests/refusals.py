@@ -1,7 +1,5 @@
 """Calls that must be refused with a message."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import ParamSpec
 

@@ -5,8 +5,6 @@ over the streams end, and after a second all of them begin again. Once it listen
 what it misses. It runs under the system's Python, which alone has GStreamer's bindings.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -1,10 +1,9 @@
 """Small run files for tests: two cameras above a few cells, frames 10 to 15, two people."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stseg.arrays import Ints, Labels, Rows, Singles
 from stseg.geometry import Camera, Grid, Rig
@@ -40,27 +39,27 @@ def small_volume(frames: int = len(FRAMES)) -> tuple[Singles, Labels]:
 
 def small_trajectory() -> Rows:
     """Track 1 in every frame, track 2 in the last three."""
-    rows = [(frame, 1) for frame in FRAMES] + [(frame, 2) for frame in FRAMES[3:]]
-    table = np.zeros(len(rows), TRAJECTORY)
-    table["frame"], table["id"] = np.array(sorted(rows)).T
-    table["x"], table["y"] = 0.15 * table["id"], 0.2
-    table["height"], table["score"], table["views"] = 1.7, 4.0, 2
-    return table
+    frame, identity = np.array(sorted([(frame, 1) for frame in FRAMES] + [(frame, 2) for frame in FRAMES[3:]])).T
+    return table_of(TRAJECTORY, frame=frame, id=identity, x=0.15 * identity, y=0.2, height=1.7, score=4.0, views=2)
+
+
+def table_of(dtype: np.dtype[np.void], **columns: ArrayLike) -> Rows:
+    """A table of columns, each one value or one for each row; the others are zero."""
+    rows = np.zeros(np.broadcast_shapes((1,), *map(np.shape, columns.values())), dtype)
+    for name, values in columns.items():
+        rows[name] = values
+    return rows
 
 
 def trajectory_of(*rows: tuple[int, int, float, float]) -> Rows:
     """Rows of frame, id, x, y of people 1.7 m tall."""
-    table = np.zeros(len(rows), TRAJECTORY)
-    for name, column in zip(("frame", "id", "x", "y"), zip(*rows, strict=True), strict=False):
-        table[name] = column
-    table["height"] = 1.7
-    return table
+    frame, identity, x, y = np.reshape(rows, (-1, 4)).T
+    return table_of(TRAJECTORY, frame=frame, id=identity, x=x, y=y, height=1.7)
 
 
 def small_ghosts() -> Rows:
     """Three candidates, one of them a ghost, of which the right view says nothing."""
-    table = np.zeros(3, ghost_type(2))
-    table["frame"], table["status"] = (10, 10, 11), (1, 0, 1)
+    table = table_of(ghost_type(2), frame=(10, 10, 11), status=(1, 0, 1))
     table["parts"][:, 0] = (2.0, -1.0, 2.0)
     return table
 
@@ -82,17 +81,21 @@ def fill(writer: RunWriter) -> None:
 
 
 def write_run(
-    path: Path, recording: Recording, trajectory: Rows, frames: Ints = FRAMES, config: str = CONFIG, **tables: Rows
+    path: Path, recording: Recording, trajectory: Rows, frames: Ints = FRAMES, config: str = CONFIG, views: int = 1
 ) -> Path:
-    """A run file of these tables, without evidence of any cell."""
+    """A run file of these tracks and of cells that so many views see, without evidence of any."""
     shape = recording.rig.grid.shape
-    with RunWriter(path, recording, np.ones(shape, np.uint8), config, overwrite=True) as writer:
+    with RunWriter(path, recording, np.full(shape, views, np.uint8), config, overwrite=True) as writer:
         volume = np.zeros((len(frames), *shape), np.float32)
         writer.append_frames(frames, volume, volume.astype(np.int32))
-        for name, table in {"trajectory": trajectory, **tables}.items():
-            writer.append(name, table)
+        writer.append("trajectory", trajectory)
         writer.finish(Tracks(trajectory).summary())
     return path
+
+
+def write_empty_run(path: Path) -> Path:
+    """A run file without frames."""
+    return write_run(path, small_recording(path.parent), trajectory_of(), FRAMES[:0])
 
 
 def write_small_run(path: Path, overwrite: bool = False, recording: Recording | None = None) -> Path:

@@ -4,13 +4,12 @@ Everything is drawn from projections of points in space, with nothing of the tab
 rows of x, y and height in metres, float64 (n, 3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 from reference_core import best_pairs
 
 from stseg.arrays import Boxes, Bytes, Floats, Rows, Singles
@@ -35,6 +34,15 @@ _FINE = 4
 _BITS = 6
 
 
+def rotation_towards(centre: ArrayLike, target: ArrayLike) -> Floats:
+    """Rotation of an upright camera at a place that looks at another, rows right, down and forward."""
+    forward = np.subtract(target, centre, dtype=float)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(forward, right), forward])
+
+
 def looking(
     name: str,
     centre: Sequence[float],
@@ -44,14 +52,9 @@ def looking(
     distortion: Sequence[float] | None = None,
 ) -> Camera:
     """A camera at a place, metres, that looks at another."""
-    place = np.asarray(centre, float)
-    forward = np.asarray(target, float) - place
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
+    rotation = rotation_towards(centre, target)
     matrix = np.array([[focal, 0.0, (size[0] - 1) / 2], [0.0, focal, (size[1] - 1) / 2], [0.0, 0.0, 1.0]])
-    projection = matrix @ np.column_stack([rotation, -rotation @ place])
+    projection = matrix @ np.column_stack([rotation, -rotation @ centre])
     lens = None if distortion is None else Lens(matrix, np.asarray(distortion, float))
     return Camera.from_projection(name, size, projection, lens)
 
@@ -172,18 +175,22 @@ def likelihoods(cameras: Sequence[Camera], standing: Floats) -> list[Singles]:
     return [(mask(camera, standing) / np.float32(255)).astype(np.float32) for camera in cameras]
 
 
-def walkers(frames: int) -> Rows:
-    """Three people who walk through the room for so many frames; TRAJECTORY rows with frame, id, x, y, height.
+def three_people(share: Floats) -> Floats:
+    """x, y, height, metres, of three people who have gone shares (n,) of their ways, float64 (n, 3, 3).
 
     The first two pass each other 0.9 m apart, the third walks a half circle.
     """
+    turn, one = np.pi * share, np.ones(len(share))
+    x = [-1.4 + 2.8 * share, 1.4 - 2.8 * share, 1.3 * np.cos(turn) + 0.1]
+    y = [-1.3 * one, -0.4 * one, 0.4 + 1.1 * np.sin(turn)]
+    return np.stack([x, y, [1.7 * one, 1.8 * one, 1.6 * one]]).T
+
+
+def walkers(frames: int) -> Rows:
+    """They walk through the room for so many frames; TRAJECTORY rows with frame, id, x, y, height."""
     rows = np.zeros((frames, 3), TRAJECTORY)
-    share = np.arange(frames) / 40
-    turn = np.pi * share
     rows["frame"], rows["id"] = np.arange(frames)[:, None], [11, 12, 13]
-    rows["x"] = np.column_stack([-1.4 + 2.8 * share, 1.4 - 2.8 * share, 1.3 * np.cos(turn) + 0.1])
-    rows["y"] = np.column_stack([np.full(frames, -1.3), np.full(frames, -0.4), 0.4 + 1.1 * np.sin(turn)])
-    rows["height"] = [1.7, 1.8, 1.6]
+    rows["x"], rows["y"], rows["height"] = np.moveaxis(three_people(np.arange(frames) / 40), 2, 0)
     return rows.ravel()
 
 

@@ -1,7 +1,5 @@
 """People who walk before cameras, without pictures: as tracks, boxes, and endpoints of silhouettes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 

@@ -1,12 +1,11 @@
 """Hypothesis strategies for geometry: cameras that watch an area, grids, rigs, recordings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
+from scenes import rotation_towards
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Grid, Lens, Rig
@@ -42,16 +41,11 @@ def poses(draw: st.DrawFn, size: tuple[int, int] = (640, 480), target: tuple[flo
     """Cameras 3 to 12 m from a target on the ground, 1.5 to 6 m high, that look at it, perhaps rolled."""
     angle, distance, height = draw(numbers(0.0, 6.2)), draw(numbers(3.0, 12.0)), draw(numbers(1.5, 6.0))
     centre = np.array([target[0] + distance * np.cos(angle), target[1] + distance * np.sin(angle), height])
-    forward = np.array([*target, 0.0]) - centre
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    level = np.stack([right, np.cross(forward, right), forward])
     roll = draw(numbers(-0.3, 0.3))
     turn = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
     focal = draw(numbers(0.5, 1.5)) * size[0]
     matrix = np.array([[focal, 0.0, size[0] / 2 - 3.3], [0.0, focal * 1.01, size[1] / 2 + 2.1], [0.0, 0.0, 1.0]])
-    rotation = turn @ level
+    rotation = turn @ rotation_towards(centre, [*target, 0.0])
     return Pose(matrix, rotation, -rotation @ centre)
 
 

@@ -1,7 +1,5 @@
 """Files of any kind and detections from strangers: a result, or one line that names the file."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys
@@ -31,8 +29,7 @@ from stseg.io.untrusted.values import is_name
 @pytest.mark.parametrize("name", ["..", ".", "a/b", "a\\b", "a\0b", "", " a", "x" * 200, "\x1b[31m", "\u202e", "a\nb"])
 def test_names_that_are_no_names_of_files_are_refused(name: str) -> None:
     assert not is_name(name)
-    with pytest.raises(InputError):
-        parse_rig(RIG.replace('"cam1"', json.dumps(name)), Path("rig.toml"))
+    refused(InputError, "found", parse_rig, RIG.replace('"cam1"', json.dumps(name)), Path("rig.toml"))
 
 
 @pytest.mark.parametrize("name", ["cam 1", "Ω", "2026-01-01T10:30:00", "<script>", "a.b"])
@@ -85,8 +82,8 @@ def test_links_and_files_beside_an_output_are_not_written_to(run_path: Path) -> 
 def test_notes_of_another_form_are_refused(tmp_path: Path, content: str) -> None:
     with WorkFolder(tmp_path / "q.h5", {"config": {"a": 1}}) as work:
         (work.path / "begun.json").write_bytes(content.encode("latin-1"))
-    with pytest.raises(InputError, match="delete the folder"), WorkFolder(tmp_path / "q.h5", {"config": {"a": 1}}):
-        pass
+    again = WorkFolder(tmp_path / "q.h5", {"config": {"a": 1}})
+    refused(InputError, "delete the folder", again.__enter__)
 
 
 def test_damaged_time_stamps_are_made_anew(tmp_path: Path) -> None:
@@ -128,9 +125,6 @@ def test_a_limit_of_file_sizes_is_one_line(run_path: Path, to: str) -> None:
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
     assert done.stderr.startswith("stseg: error: ")
     assert sorted(path.name for path in run_path.parent.iterdir()) == ["left.avi", "night.h5"]
-
-
-# Detections
 
 
 SIZE = (64, 48)

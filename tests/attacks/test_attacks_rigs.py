@@ -1,18 +1,18 @@
 """Rig files, calibrations and recordings from strangers: a result, or one line that names the file."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct
 import sys
 import zipfile
 from pathlib import Path
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
 import pytest
 from attacks import RIG, film, write_rig
+from fuzz.corpus import mat_file
 from recordings import COMMAND, process
 from refusals import Command, refused
 
@@ -90,12 +90,10 @@ def test_boxes_beyond_the_limits_are_refused(tmp_path: Path, refusal: Command, r
 
 
 def test_a_file_with_a_superscript_in_its_name_is_ordered(tmp_path: Path) -> None:
-    recording = read_recording(
-        write_rig(tmp_path, 'kind = "boxes", path = "boxes.csv"', 'kind = "video", path = "a*.avi"')
-    )
+    rig = write_rig(tmp_path, 'kind = "boxes", path = "boxes.csv"', 'kind = "video", path = "a*.avi"')
     for name in ("a1²2.avi", "a10²2.avi", "a9²2.avi"):
         (tmp_path / name).write_bytes(b"\0")
-    parts = source_parts(recording.sources[0].source, "")
+    parts = source_parts(read_recording(rig).sources[0].source, "")
     assert [part.path.name for part in parts] == ["a1²2.avi", "a9²2.avi", "a10²2.avi"]
 
 
@@ -104,33 +102,8 @@ def test_hundreds_of_thousands_of_points_are_refused(tmp_path: Path, refusal: Co
     refusal("calibrate", "points", tmp_path / "p.csv", "-o", tmp_path / "r.toml", *SCENE, "--size=64,48")
 
 
-# Calibrations
-
-
-def mat_file(name: bytes = b"P", rows: int = 3, columns: int = 4, size: int | None = None) -> bytes:
-    values = np.arange(12, dtype="<f8").tobytes()
-    flags = struct.pack("<IIII", 6, 8, 6, 0)
-    sizes = struct.pack("<IIii", 5, 8, rows, columns)
-    title = struct.pack("<HH4s", 1, len(name), name.ljust(4, b"\0"))
-    body = flags + sizes + title + struct.pack("<II", 9, len(values)) + values
-    return b"MATLAB".ljust(124) + b"\0\1IM" + struct.pack("<II", 14, len(body) if size is None else size) + body
-
-
 def test_matlab_matrices_are_read_by_columns() -> None:
     np.testing.assert_array_equal(parse_mat(mat_file())["P"], np.arange(12.0).reshape(4, 3).T)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_a_mutated_matlab_file_is_refused_or_read(seed: int) -> None:
-    random, data = np.random.default_rng(seed), bytearray(mat_file())
-    for place in random.integers(128, len(data), 8):
-        data[place] = random.integers(256)
-    try:
-        matrices = parse_mat(bytes(data))
-    except ValueError as error:
-        assert "\n" not in str(error)
-    else:
-        assert all(matrix.ndim == 2 for matrix in matrices.values())
 
 
 def test_a_matlab_file_that_declares_more_than_it_has_is_refused() -> None:
@@ -156,10 +129,8 @@ def test_numpy_headers_are_not_believed(header: str) -> None:
 def test_a_small_archive_that_unpacks_to_gigabytes_is_refused(tmp_path: Path, refusal: Command) -> None:
     with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.npy", bytes(200_000_000))
-    options = (*SCENE, "--size=64,48", "--names=a")
-    assert "unpacked" in refusal(
-        "calibrate", "import", "matrix", tmp_path / "a.npz", "-o", tmp_path / "r.toml", *options
-    )
+    options = ("-o", tmp_path / "r.toml", *SCENE, "--size=64,48", "--names=a")
+    assert "unpacked" in refusal("calibrate", "import", "matrix", tmp_path / "a.npz", *options)
 
 
 ATTRIBUTES = [{"name": "frameWidth", "value": "9" * 5000}, {"name": "frameHeight", "value": "9"}]
@@ -189,9 +160,6 @@ def test_calibrations_are_refused_in_one_line(
     calibration, rig = tmp_path / f"a{suffix}", tmp_path / "rig.toml"
     refusal("calibrate", "import", format, calibration, "-o", rig, *SCENE, "--unit=m", "--up=+z")
     assert not (tmp_path / "rig.toml").exists()
-
-
-# Recordings
 
 
 @pytest.mark.parametrize("name", ["2026-01-01T10:30:00.avi", "http:127.0.0.1:9701", "concat:a", "-", "a%03d.avi"])
@@ -227,17 +195,17 @@ def test_pipes_are_not_waited_for(tmp_path: Path, refusal: Command) -> None:
 
 def test_ffmpeg_is_told_to_open_files_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     film(tmp_path / "a.avi", tmp_path / "plain.avi")
-    seen: list[str | None] = []
+    found: list[str | None] = []
 
     def open_capture(address: str, backend: int) -> cv2.VideoCapture:
-        seen.append(os.environ.get("OPENCV_FFMPEG_CAPTURE_OPTIONS"))
+        found.append(os.environ.get("OPENCV_FFMPEG_CAPTURE_OPTIONS"))
         return plain(address, backend)
 
     plain = cv2.VideoCapture
     monkeypatch.setattr(cv2, "VideoCapture", open_capture)
     monkeypatch.setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;http")
     assert read_video_size(tmp_path / "a.avi") == (64, 48)
-    assert seen == ["protocol_whitelist;file"]
+    assert found == ["protocol_whitelist;file"]
     assert os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] == "protocol_whitelist;http"
 
 
@@ -259,7 +227,7 @@ def test_a_png_chunk_longer_than_its_file_is_not_decoded(tmp_path: Path, monkeyp
     start = data.index(b"IDAT") - 4
     data[start : start + 4] = b"\x7f\xff\xff\xff"
     (tmp_path / "a.png").write_bytes(data)
-    monkeypatch.setattr(cv2, "imdecode", decoded_nothing)
+    monkeypatch.setattr(cv2, "imdecode", Mock(side_effect=AssertionError("it was decoded")))
     refused(SourceError, "a broken file", read_picture, tmp_path / "a.png", "images", (64, 48), "")
 
 
@@ -268,9 +236,5 @@ def test_a_packet_that_declares_a_huge_picture_is_not_decoded(monkeypatch: pytes
     start = packet.index(b"\xff\xc0") + 5
     assert PictureHeads().fits(np.frombuffer(packet, np.uint8))
     packet[start : start + 4] = (16000).to_bytes(2, "big") + (65500).to_bytes(2, "big")
-    monkeypatch.setattr(cv2, "imdecode", decoded_nothing)
+    monkeypatch.setattr(cv2, "imdecode", Mock(side_effect=AssertionError("it was decoded")))
     assert not PictureHeads().fits(np.frombuffer(packet, np.uint8))
-
-
-def decoded_nothing(*_: object) -> None:
-    raise AssertionError("it was decoded")

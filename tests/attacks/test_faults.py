@@ -5,12 +5,9 @@ rename, link, mkdir, unlink) and makes the n-th fail, write half, or kill the pr
 or the new one whole; and the same command without faults gives the same datasets, bit for bit.
 """
 
-from __future__ import annotations
-
 import errno
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -28,24 +25,14 @@ def driver(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
     own.close()
 
 
-ERRORS = (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EACCES)
-
-
-@dataclass(frozen=True)
-class Whole:
-    """A run without faults: its file, and the calls that it made."""
-
-    output: Path
-    calls: tuple[str, ...]
-
-
 @pytest.fixture(scope="module")
-def whole(driver: Driver, tmp_path_factory: pytest.TempPathFactory) -> Whole:
+def whole(driver: Driver, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[str, ...]]:
+    """The file of a run without faults, and the calls that it made."""
     output = tmp_path_factory.mktemp("whole") / "out" / "run.h5"
     output.parent.mkdir()
     done = driver.run(output)
     assert done.status == 0, done.messages
-    return Whole(output, done.calls)
+    return output, done.calls
 
 
 def places(calls: tuple[str, ...], fault: str) -> list[int]:
@@ -65,20 +52,23 @@ def places(calls: tuple[str, ...], fault: str) -> list[int]:
 @pytest.mark.parametrize(
     "fault", ["kill", "kill after", "short", *map(str, (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EACCES))]
 )
-def test_no_fault_loses_anything(driver: Driver, whole: Whole, tmp_path: Path, fault: str) -> None:
-    for at in places(whole.calls, fault):
-        output, call = tmp_path / str(at) / "run.h5", f"call {at}, {whole.calls[at]}"
+def test_no_fault_loses_anything(
+    driver: Driver, whole: tuple[Path, tuple[str, ...]], tmp_path: Path, fault: str
+) -> None:
+    expected, calls = whole
+    for at in places(calls, fault):
+        output, call = tmp_path / str(at) / "run.h5", f"call {at}, {calls[at]}"
         output.parent.mkdir()
         faulty = driver.run(output, fault, at)
         assert "Traceback" not in faulty.messages, f"{call}: {faulty.messages}"
         if faulty.status > 0:
             assert (faulty.status, "stseg: error: " in faulty.messages) == (2, True), f"{call}: {faulty.messages}"
         if output.exists():
-            assert_same(output, whole.output)
+            assert_same(output, expected)
         if faulty.status != 0:
             finished = output.exists() and not Path(f"{output}.segments").exists()
             again = driver.run(output)  # a run that was finished is refused as any other output that exists
             assert again.status == (2 if finished else 0), f"{call}: {again.messages}"
-            assert_same(output, whole.output)
+            assert_same(output, expected)
             left = {path.name for path in output.parent.iterdir()}
             assert left == {"run.h5"}, f"{call}: {left}"

@@ -1,7 +1,5 @@
 """A short round of fuzzing with fixed seeds; `python -m tests.fuzz --minutes 60` goes on."""
 
-from __future__ import annotations
-
 import sys
 import time
 from pathlib import Path

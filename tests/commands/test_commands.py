@@ -1,7 +1,5 @@
 """Commands, and the demo that the README begins with."""
 
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -9,21 +7,20 @@ import re
 import subprocess
 import sys
 from contextlib import redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from recordings import COMMAND, ENVIRONMENT, process
 from refusals import Command
-from run_files import CONFIG, small_recording, small_trajectory
+from run_files import small_recording, small_trajectory, trajectory_of, write_run
 
 import stseg
 from stseg.commands.inspect import event_counts_text
 from stseg.commands.main import COMMANDS, main
-from stseg.io.runfile.runs import RunWriter, read_run
+from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.records.tables import TRAJECTORY, Tracks
 from stseg.tasks.overview import summarise_run
 
 # The command line
@@ -36,8 +33,7 @@ def test_help_names_every_command_and_imports_none() -> None:
     )
     found = process(program)
     assert (found.returncode, found.stderr.strip()) == (0, "")
-    for command in COMMANDS:
-        assert f" {command} " in found.stdout
+    assert all(f" {command} " in found.stdout for command in COMMANDS)
 
 
 def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
@@ -180,10 +176,7 @@ def test_inspect_counts_a_merge_and_its_split_as_one_encounter() -> None:
 
 
 def test_inspect_warns_of_an_empty_run(tmp_path: Path, stdout: Command) -> None:
-    path, volume = tmp_path / "silent.h5", np.full((1, 3, 4, 6), np.nan, np.float32)
-    with RunWriter(path, small_recording(tmp_path), np.zeros((3, 4, 6), np.uint8), CONFIG, overwrite=False) as writer:
-        writer.append_frames(np.array([0]), volume, np.zeros(volume.shape, np.int32))
-        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    path = write_run(tmp_path / "silent.h5", small_recording(tmp_path), trajectory_of(), np.array([0]), views=0)
     assert summarise_run(read_run(path)).warnings == ["no person was found", "no view sees any cell"]
     assert "warning: no person was found" in stdout("inspect", path)
 
@@ -191,8 +184,8 @@ def test_inspect_warns_of_an_empty_run(tmp_path: Path, stdout: Command) -> None:
 # export
 
 
-def test_export_to_csv_reads_back(run_path: Path, tmp_path: Path) -> None:
-    assert main(["export", str(run_path), "--to", "csv", "-o", str(tmp_path / "tracks.csv")]) == 0
+def test_export_to_csv_reads_back(run_path: Path, tmp_path: Path, stdout: Command) -> None:
+    stdout("export", run_path, "--to", "csv", "-o", tmp_path / "tracks.csv")
     table = read_tracks_csv(tmp_path / "tracks.csv")
     for name in ("frame", "id"):
         np.testing.assert_array_equal(table[name], small_trajectory()[name])
@@ -228,16 +221,12 @@ def test_evaluate_takes_a_run_file(run_path: Path, tmp_path: Path, stdout: Comma
     assert json.loads(stdout("evaluate", run_path, truth, "--json"))["MODA"] == 100
 
 
-# The demo
-
-
 ROOT = Path(__file__).parents[2]
 LEAST_MODA = 96.5
 """Percent at half a metre: a point less than what was measured."""
 
 
-@dataclass(frozen=True)
-class Demo:
+class Demo(NamedTuple):
     """A demo that was run: its folder, and what it printed."""
 
     folder: Path
@@ -280,16 +269,6 @@ def test_a_folder_with_files_in_it_is_left_alone(tmp_path: Path, refusal: Comman
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
     assert main(["demo", str(tmp_path / "mine.txt")]) == 2
     assert (tmp_path / "mine.txt").read_text() == "precious"
-
-
-def test_the_python_example_of_the_readme_runs(demo: Demo, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pandas")
-    example = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
-    assert len(example) == 1
-    monkeypatch.chdir(demo.folder)
-    names: dict[str, object] = {}
-    exec(example[0], names)
-    assert len(names["tracks"]) == len(read_run(demo.folder / "run.h5").trajectory)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("model", ["chromatic", "codebook"])

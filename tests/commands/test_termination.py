@@ -1,7 +1,5 @@
 """Signals end a command within two seconds, whatever it is doing."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys
@@ -107,10 +105,6 @@ _SECONDS = 3.0
 """Two, on a machine that is busy."""
 
 
-Ended = tuple[int, str, float]
-"""Exit status, the last of standard error, and the time that the end took."""
-
-
 @contextmanager
 def command(folder: Path, what: str) -> Iterator[subprocess.Popen[str]]:
     """A command that is at work on something."""
@@ -127,14 +121,14 @@ def command(folder: Path, what: str) -> Iterator[subprocess.Popen[str]]:
             running.kill()
 
 
-def ended_by(running: subprocess.Popen[str], number: signal.Signals) -> Ended:
-    """How a command ends by a signal."""
+def ended_by(running: subprocess.Popen[str], number: signal.Signals) -> tuple[int, str]:
+    """Exit status of a command that a signal ends in time, and the last of its standard error."""
     start = time.monotonic()
     running.send_signal(number)
     status = running.wait(20)
-    seconds = time.monotonic() - start
+    assert time.monotonic() - start < _SECONDS
     assert running.stderr is not None
-    return status, running.stderr.read().strip(), seconds
+    return status, running.stderr.read().strip()
 
 
 TERMINATED, INTERRUPTED = (signal.SIGTERM, 143, "stseg: terminated"), (signal.SIGINT, 130, "stseg: interrupted")
@@ -159,9 +153,7 @@ compiled = pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
 def test_a_signal_ends_a_command_in_time(what: str, sent: tuple[signal.Signals, int, str], tmp_path: Path) -> None:
     number, status, line = sent
     with command(tmp_path, what) as running:
-        ended, said, seconds = ended_by(running, number)
-    assert (ended, said) == (status, line)
-    assert seconds < _SECONDS
+        assert ended_by(running, number) == (status, line)
 
 
 @compiled
@@ -173,6 +165,4 @@ def test_a_run_that_goes_on_is_asked_first_and_ended_then(tmp_path: Path) -> Non
         first = running.stderr.readline()
         assert first == "stseg: finishing; once more to stop at once\n", first + running.stderr.read()
         assert time.monotonic() - start < _SECONDS
-        ended, said, seconds = ended_by(running, signal.SIGINT)
-    assert (ended, said) == (130, "stseg: interrupted")
-    assert seconds < _SECONDS
+        assert ended_by(running, signal.SIGINT) == (130, "stseg: interrupted")

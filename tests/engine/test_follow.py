@@ -1,11 +1,8 @@
 """`stseg run --follow`: what is followed ends as what is run afterwards; signals, kills and breaks lose nothing."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,13 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arrivals import FRAMES, PLACES, StandIn, arrive, filmed_rig, films, meanwhile, write_pieces, write_video
-from recordings import ENVIRONMENT, assert_same, compiled_only
+import recordings
+from arrivals import StandIn, arrive, films, meanwhile, write_pieces
+from films import write_at_rate
+from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, filmed_rig, run_words, started
+from refusals import Command
+from run_files import table_of, trajectory_of
 from scenes import walkers
 
 import stseg.engine.live.following
 from stseg.arrays import Rows
-from stseg.commands.main import main
 from stseg.engine.live.following import last_frame
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
@@ -33,12 +33,7 @@ from stseg.records.tables import CORRECTION, TRAJECTORY
 from stseg.tracking.windows.windows import ENDLESS
 from stseg.trajectories.live_ids import LiveCorrections, LiveIds, corrected_ids
 
-PROGRAM = """
-import signal, sys
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
-from stseg.commands.main import main
-sys.exit(main())
-"""
+pytestmark = compiled_only
 CONSTANTS = (
     "segments.length=1.5 segments.warm_up=0.5 segments.background_period=2 segments.background_samples=4 "
     "tracking.context=0 detection.lattice_spacing=0.25 live.file_quiet_time=0.3 live.background_time=1 "
@@ -48,14 +43,11 @@ OPTIONS = tuple(word for constant in CONSTANTS.split() for word in ("--set", con
 """Segments of twelve frames; backgrounds that hold for sixteen; tracks that are final with their window."""
 
 
-def track(rig: Path, output: Path, *more: str) -> int:
-    alone = () if "--workers" in more else ("--workers", "1")
-    return main(["run", str(rig), "-o", str(output), *alone, *OPTIONS, *more])
+track = partial(recordings.track, options=OPTIONS)
 
 
 def process(rig: Path, output: Path, *more: str) -> subprocess.Popen[str]:
-    arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), "--follow", *OPTIONS, *more]
-    return subprocess.Popen(arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    return started(COMMAND, "run", rig, "-o", output, "--follow", *OPTIONS, *more)
 
 
 def lines(output: Path) -> list[str]:
@@ -69,9 +61,6 @@ def wait_for_frame(output: Path, frame: int, running: subprocess.Popen[str]) -> 
     while running.poll() is None and max([-1, *(int(line.split(",")[0]) for line in lines(output)[1:])]) < frame:
         assert time.monotonic() < deadline
         time.sleep(0.1)
-
-
-# Files that arrive
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +88,6 @@ def afterwards(rig: Path, live: Path, tmp_path_factory: pytest.TempPathFactory) 
     return output
 
 
-@compiled_only
 def test_what_is_followed_ends_as_what_is_run_afterwards(live: Path, afterwards: Path) -> None:
     assert_same(live, afterwards)
     scores = evaluate(walkers(FRAMES), read_run(live).trajectory)
@@ -107,8 +95,7 @@ def test_what_is_followed_ends_as_what_is_run_afterwards(live: Path, afterwards:
     assert sorted(path.name for path in live.parent.iterdir()) == ["run.h5", "run.h5.live.csv"]
 
 
-@compiled_only
-def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> None:
+def test_tracks_are_written_window_by_window_under_lasting_ids(live: Path) -> None:
     messages = read_tracks_csv(live.with_name("run.h5.live.csv"))
     assert np.unique(messages["frame"]).tolist() == list(range(FRAMES))
     assert (np.diff(messages["frame"]) >= 0).all()
@@ -116,8 +103,7 @@ def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> Non
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
 
 
-@compiled_only
-def test_ids_that_are_corrected_go_on_so_and_are_told(
+def test_ids_that_are_corrected_go_on_so_and_are_written(
     rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As if two had been exchanged from frame 4 on, which is decided with some frame after 20."""
@@ -137,24 +123,22 @@ def test_ids_that_are_corrected_go_on_so_and_are_told(
     assert track(rig, output, "--follow", "--frames", f"0:{FRAMES}") == 0
     messages = read_tracks_csv(output.with_name("run.h5.live.csv"))
     assert evaluate(walkers(FRAMES), messages).switches == 2
-    told = CorrectionTable(output.with_name("run.h5.live_corrections.csv"), FRAMES).rows
-    assert told["decision_frame"].tolist() == decided * 2
-    late = corrected_ids(messages, told)
+    corrections = CorrectionTable(output.with_name("run.h5.live_corrections.csv"), FRAMES).rows
+    assert corrections["decision_frame"].tolist() == decided * 2
+    late = corrected_ids(messages, corrections)
     assert evaluate(walkers(FRAMES), late[late["frame"] >= 4]).switches == 0
     assert_same(output, live)
 
 
-@compiled_only
 def test_the_run_file_keeps_every_line_of_the_live_table(live: Path) -> None:
-    """By frame and place, so that final ids are found for what was told under provisional ones."""
-    told, kept = read_tracks_csv(live.with_name("run.h5.live.csv")), read_run(live).committed
-    assert len(told) == len(kept) > 0
-    told, kept = (rows[np.lexsort((rows["x"], rows["frame"]))] for rows in (told, kept))
+    """By frame and place, so that final ids are found for what was written under provisional ones."""
+    written, kept = read_tracks_csv(live.with_name("run.h5.live.csv")), read_run(live).committed
+    assert len(written) == len(kept) > 0
+    written, kept = (rows[np.lexsort((rows["x"], rows["frame"]))] for rows in (written, kept))
     for name in ("frame", "x", "y"):
-        np.testing.assert_allclose(told[name], kept[name], atol=6e-4, rtol=0)
+        np.testing.assert_allclose(written[name], kept[name], atol=6e-4, rtol=0)
 
 
-@compiled_only
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
@@ -187,7 +171,6 @@ def test_a_run_to_which_nothing_came_leaves_nothing(tmp_path: Path) -> None:
     assert list(output.parent.iterdir()) == []
 
 
-@compiled_only
 def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2)
@@ -202,7 +185,6 @@ def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
     assert not output.exists()
 
 
-@compiled_only
 def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, tmp_path: Path) -> None:
     assert live.exists()
     output = tmp_path / "run.h5"
@@ -218,7 +200,6 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
     assert (evaluate(walkers(FRAMES), messages).switches, len(messages)) == (0, 3 * FRAMES)
 
 
-@compiled_only
 def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)
@@ -228,9 +209,6 @@ def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.
     assert run.frames.tolist() == list(range(FRAMES))
     scores = evaluate(walkers(FRAMES), run.trajectory)
     assert scores.misses < 0.1 * 3 * FRAMES
-
-
-# Live cameras
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +226,6 @@ def _as_live(rig: Path, path: Path, addresses: dict[str, str]) -> Path:
     return path
 
 
-@compiled_only
 def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
     cameras_rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -269,16 +246,12 @@ def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
     assert len(run.tracks) >= 3
 
 
-def test_files_beside_live_cameras_are_refused(
-    cameras_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    mixed = _as_live(
-        cameras_rig.with_name("rig.toml"), cameras_rig.with_name("mixed.toml"), {"east": "rtsp://there/east"}
-    )
-    assert track(mixed, tmp_path / "run.h5", "--follow") == 2
-    assert "camera west: found files beside live streams" in capsys.readouterr().err
-    assert track(cameras_rig, tmp_path / "run.h5") == 2
-    assert "stseg run --follow" in capsys.readouterr().err
+def test_files_beside_live_cameras_are_refused(cameras_rig: Path, tmp_path: Path, refusal: Command) -> None:
+    rig, output = cameras_rig.with_name("rig.toml"), tmp_path / "run.h5"
+    mixed = _as_live(rig, cameras_rig.with_name("mixed.toml"), {"east": "rtsp://there/east"})
+    said = "camera west: found files beside live streams"
+    assert said in refusal(*run_words(mixed, output, "--follow", options=OPTIONS))
+    assert "stseg run --follow" in refusal(*run_words(cameras_rig, output, options=OPTIONS))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -288,7 +261,7 @@ def server(cameras_rig: Path) -> Iterator[dict[str, str]]:
     folder = cameras_rig.parent
     streams = []
     for camera, film in zip(filmed_rig().cameras, films(filmed_rig()), strict=True):
-        write_video(folder / f"{camera.name}.avi", film * 2)
+        write_at_rate(folder / f"{camera.name}.avi", film * 2)
         streams.append(f"{camera.name}={folder / camera.name}.avi")
     command = ["/usr/bin/python3", str(Path(__file__).parents[1].joinpath("rtsp_server.py")), "0", *streams]
     try:
@@ -307,7 +280,6 @@ def server(cameras_rig: Path) -> Iterator[dict[str, str]]:
 
 
 @pytest.mark.slow
-@compiled_only
 def test_a_real_rtsp_server_whose_streams_end_is_followed(
     cameras_rig: Path, server: dict[str, str], tmp_path: Path
 ) -> None:
@@ -325,9 +297,6 @@ def test_a_real_rtsp_server_whose_streams_end_is_followed(
     assert len(run.tracks) >= 3
 
 
-# What is asked, and names
-
-
 def test_where_it_ends_by_itself() -> None:
     assert (last_frame(None), *(last_frame(FrameRange.parse(text)) for text in ("0:7", ":7"))) == (ENDLESS, 7, 7)
     for wrong in ("5:7", "7", "0:", "0:0", "0:x"):
@@ -336,22 +305,19 @@ def test_where_it_ends_by_itself() -> None:
 
 
 @pytest.mark.parametrize("more", [("--workers", "2"), ("--scheduler", "tcp://there:1")])
-def test_what_does_not_go_with_it(tmp_path: Path, more: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    rig = write_pieces(tmp_path, empty=True)
-    assert track(rig, tmp_path / "run.h5", "--follow", *more) == 2
-    assert f"{more[0]}: found that beside --follow" in capsys.readouterr().err
+def test_what_does_not_go_with_it(tmp_path: Path, more: tuple[str, ...], refusal: Command) -> None:
+    words = run_words(write_pieces(tmp_path, empty=True), tmp_path / "run.h5", "--follow", *more, options=OPTIONS)
+    assert f"{more[0]}: found that beside --follow" in refusal(*words)
 
 
 def places(track: int, frames: range, x: float) -> Rows:
-    rows = np.zeros(len(frames), TRAJECTORY)
-    rows["frame"], rows["id"], rows["x"] = frames, track, x
-    return rows
+    return table_of(TRAJECTORY, frame=frames, id=track, x=x)
 
 
 def test_names_last_over_segments() -> None:
     nothing = np.zeros(0, CORRECTION)
-    names = LiveIds(np.zeros(0, TRAJECTORY), nothing, 20)
-    first = names.begin(np.zeros(0, TRAJECTORY))
+    names = LiveIds(trajectory_of(), nothing, 20)
+    first = names.begin(trajectory_of())
     messages = names.named(np.concatenate([places(4, range(10), 0.0), places(7, range(10), 3.0)]), first)
     assert messages["id"].tolist() == [1] * 10 + [2] * 10
     second = names.begin(np.concatenate([places(1, range(5, 10), 3.1), places(2, range(5, 10), 9.0)]))

@@ -1,11 +1,8 @@
 """Machines that are not as usual: no locks, little memory, a home that cannot be written, other users, odd clocks."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -16,7 +13,7 @@ from typing import Any
 import h5py
 import pytest
 from attacks import write_rig
-from recordings import ALONE, ENVIRONMENT, OPTIONS, assert_same, compiled_only, process, track, write_recording
+from recordings import COMMAND, OPTIONS, assert_same, compiled_only, process, run_words, started, track, write_recording
 from run_files import write_small_run
 
 from stseg.commands.main import main
@@ -28,8 +25,8 @@ from stseg.io.runfile.unfinished import part_file
 from stseg.io.untrusted.values import printable
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")
+pytestmark = compiled_only
 YEAR = 3e7
-COMMAND = "import sys; from stseg.commands.main import command; command()"
 AS_NOBODY = """
 import codecs, json, os, sys
 import stseg.commands.export, stseg.commands.inspect
@@ -45,13 +42,6 @@ for arguments in json.loads(sys.argv[1]):
 """Several commands. Imports come first: this user need not be able to read the libraries."""
 
 
-def lines_of(program: str, *arguments: object, **environment: str) -> tuple[int, list[str]]:
-    """Exit status of a command in a process of its own, and its lines on standard error."""
-    done = process(program, *arguments, cwd=None, **environment)
-    return done.returncode, done.stderr.splitlines()
-
-
-@compiled_only
 @LINUX
 def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / os.fsdecode(b"caf\xe9:1")
@@ -70,7 +60,6 @@ def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFix
     ]
 
 
-@compiled_only
 @pytest.mark.parametrize("code", [errno.ENOLCK, errno.ENOSYS])
 def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
     rig = write_recording(tmp_path)
@@ -100,16 +89,17 @@ def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.
 @pytest.mark.parametrize("mebibytes", [200, 1000])
 def test_too_little_address_space_is_one_line(tmp_path: Path, mebibytes: int) -> None:
     limit = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({mebibytes << 20},) * 2);"
-    status, lines = lines_of(limit + COMMAND, "run", write_rig(tmp_path), "-o", tmp_path / "run.h5")
-    said = f"stseg: error: limit of address space (ulimit -v): found {mebibytes} MiB, expected 2048 MiB or more"
-    assert (status, lines) == (2, [said])
+    done = process(limit + COMMAND, "run", write_rig(tmp_path), "-o", tmp_path / "run.h5")
+    said = f"stseg: error: limit of address space (ulimit -v): found {mebibytes} MiB, expected 2048 MiB or more\n"
+    assert (done.returncode, done.stderr) == (2, said)
 
 
 @LINUX
 def test_a_home_that_cannot_be_written_serves(tmp_path: Path) -> None:
     run = write_small_run(tmp_path / "run.h5")
     for arguments in (("export", run, "--to", "csv", "-o", tmp_path / "t.csv"), ("report", run, "-o", tmp_path / "r")):
-        assert lines_of(COMMAND, *arguments, HOME="/proc/nowhere", XDG_CACHE_HOME="", NUMBA_CACHE_DIR="") == (0, [])
+        done = process(COMMAND, *arguments, HOME="/proc/nowhere", XDG_CACHE_HOME="", NUMBA_CACHE_DIR="")
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.fixture
@@ -140,7 +130,7 @@ def test_files_of_another_user_are_left_alone(shared: Path) -> None:
         f"export {run} --to csv -o {shared}/open/t.csv --overwrite": "not permitted",
         f"inspect {secret}": f"{secret}: found a file that this user may not read",
     }
-    _, lines = lines_of(AS_NOBODY, json.dumps([command.split() for command in tried]))
+    lines = process(AS_NOBODY, json.dumps([command.split() for command in tried])).stderr.splitlines()
     assert lines[1::2] == ["status 2"] * len(tried), "\n".join(lines)
     assert all(what in line for line, what in zip(lines[::2], tried.values(), strict=True)), lines
     assert content_of(shared) == before
@@ -166,19 +156,17 @@ def test_parts_of_a_later_clock_are_removed(tmp_path: Path) -> None:
     assert [part.exists() for part in parts] == [False, True, False]
 
 
-@compiled_only
 def test_a_clock_set_back_before_a_resume_changes_nothing(tmp_path: Path) -> None:
     (tmp_path / "whole").mkdir()
     rig, night = write_recording(tmp_path), tmp_path / "night.h5"
     assert track(rig, tmp_path / "whole" / "run.h5") == 0
-    arguments = ["run", str(rig), "-o", str(night), *OPTIONS, *ALONE]
-    with subprocess.Popen([sys.executable, "-c", COMMAND, *arguments], env=ENVIRONMENT) as running:
+    with started(COMMAND, *run_words(rig, night)) as running:
         while running.poll() is None and not list(tmp_path.glob("night.h5.segments/segment-*-*.h5")):
             time.sleep(0.01)
         running.kill()
     assert not night.exists()
     for path in tmp_path.glob("night.h5.segments/*"):
         os.utime(path, (time.time() + YEAR,) * 2)
-    assert main(arguments) == 0
+    assert track(rig, night) == 0
     assert_same(night, tmp_path / "whole" / "run.h5")
     assert not list(tmp_path.glob("night.h5.*"))

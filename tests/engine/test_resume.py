@@ -1,35 +1,30 @@
 """Nothing is lost: runs that are killed, stopped, starved or tampered with go on and end as if nothing had happened."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import ALONE, ENVIRONMENT, FRAMES, OPTIONS, assert_same, compiled_only, track
+from recordings import COMMAND, FRAMES, assert_same, compiled_only, process, run_words, started, track
+from refusals import Command
 from scenes import walkers
 
 from stseg.evaluation import evaluate
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_files import checksum
 
-PROGRAM = """
-import signal, sys, time
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
-from stseg.commands.main import main
+SLOW_DISK = """
+import time
 from stseg.engine.offline.segment_writer import SegmentWriter
 keep = SegmentWriter.keep
 SegmentWriter.keep = lambda writer: (time.sleep(0.5), keep(writer))[1]
-sys.exit(main())
 """
-"""A run on a slow disk, that it is still at work when a signal reaches it on a machine of any speed."""
+"""What makes the disk of a run slow, that it is still at work when a signal reaches it on a machine of any speed."""
 pytestmark = compiled_only
 
 
@@ -38,9 +33,12 @@ def night(tmp_path: Path) -> Path:
     return tmp_path / "night.h5"
 
 
-def process(rig: Path, output: Path) -> subprocess.Popen[str]:
-    arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), *OPTIONS, *ALONE]
-    return subprocess.Popen(arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+def run_until(rig: Path, output: Path, segments: int) -> subprocess.Popen[str]:
+    """A run that has made so many segments."""
+    running = started(SLOW_DISK + COMMAND, *run_words(rig, output))
+    while len(segments_of(output)) < segments and running.poll() is None:
+        time.sleep(0.005)
+    return running
 
 
 def segments_of(output: Path) -> list[Path]:
@@ -85,8 +83,7 @@ while True:
         os.remove({str(night)!r})
 print(kills)
 """
-    arguments = [sys.executable, "-c", driver, "run", str(rig_path), "-o", str(night), *OPTIONS, *ALONE]
-    done = subprocess.run(arguments, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    done = process(driver, *run_words(rig_path, night))
     assert done.stdout.strip().endswith("20"), done.stderr
     assert_same(night, undisturbed)
     assert [path.name for path in night.parent.iterdir()] == [night.name]
@@ -96,9 +93,7 @@ print(kills)
 def test_a_signal_ends_a_run_cleanly(
     rig_path: Path, undisturbed: Path, night: Path, number: signal.Signals, status: int
 ) -> None:
-    running = process(rig_path, night)
-    while len(segments_of(night)) < 2 and running.poll() is None:
-        time.sleep(0.005)
+    running = run_until(rig_path, night, 2)
     running.send_signal(number)
     _, messages = running.communicate(timeout=60)
     assert running.returncode == status
@@ -115,9 +110,7 @@ def test_a_signal_ends_a_run_cleanly(
 def killed(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An output of which some segments are done, and no run is at work."""
     output = tmp_path_factory.mktemp("killed") / "night.h5"
-    running = process(rig_path, output)
-    while len(segments_of(output)) < 3 and running.poll() is None:
-        time.sleep(0.005)
+    running = run_until(rig_path, output, 3)
     running.kill()
     running.communicate()
     assert len(segments_of(output)) >= 3
@@ -163,23 +156,20 @@ def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, ha
     ],
 )
 def test_another_run_is_refused_and_the_difference_named(
-    rig_path: Path, halfway: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], reported: str
+    rig_path: Path, halfway: Path, refusal: Command, more: tuple[str, ...], reported: str
 ) -> None:
     kept = [path.name for path in segments_of(halfway)]
-    assert track(rig_path, halfway, *more) == 2
-    messages = capsys.readouterr().err
-    assert re.search(reported, messages), messages
-    assert "delete the folder night.h5.segments" in messages
+    said = refusal(*run_words(rig_path, halfway, *more))
+    assert re.search(rf"{reported}.*delete the folder night\.h5\.segments", said), said
     assert [path.name for path in segments_of(halfway)] == kept
 
 
-def test_changed_sources_are_refused(rig_path: Path, halfway: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_changed_sources_are_refused(rig_path: Path, halfway: Path, refusal: Command) -> None:
     source = rig_path.parent / "east.csv"
     before, state = source.read_text(), source.stat()
     try:
         source.write_text(before + "39,1,1,2,2\n")
-        assert track(rig_path, halfway) == 2
-        assert "source.east, frames: found" in capsys.readouterr().err
+        assert "source.east, frames: found" in refusal(*run_words(rig_path, halfway))
     finally:
         source.write_text(before)
         os.utime(source, ns=(state.st_atime_ns, state.st_mtime_ns))
@@ -187,29 +177,25 @@ def test_changed_sources_are_refused(rig_path: Path, halfway: Path, capsys: pyte
 
 
 def test_a_source_that_vanishes_loses_no_segment(
-    rig_path: Path, undisturbed: Path, halfway: Path, capsys: pytest.CaptureFixture[str]
+    rig_path: Path, undisturbed: Path, halfway: Path, refusal: Command
 ) -> None:
     source, away = rig_path.parent / "east.csv", rig_path.parent / "away.csv"
     source.rename(away)
     try:
-        assert track(rig_path, halfway) == 2
+        assert "east.csv" in refusal(*run_words(rig_path, halfway))
     finally:
         away.rename(source)
-    assert "east.csv" in capsys.readouterr().err
     assert len(segments_of(halfway)) >= 3
     assert track(rig_path, halfway) == 0
     assert_same(halfway, undisturbed)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs the locks of POSIX systems")
-def test_two_runs_keep_off_one_output(rig_path: Path, night: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    running = process(rig_path, night)
-    while not segments_of(night) and running.poll() is None:
-        time.sleep(0.005)
+def test_two_runs_keep_off_one_output(rig_path: Path, night: Path, refusal: Command) -> None:
+    running = run_until(rig_path, night, 1)
     running.send_signal(signal.SIGSTOP)
     try:
-        assert track(rig_path, night) == 2
-        assert "another run" in capsys.readouterr().err
+        assert "another run" in refusal(*run_words(rig_path, night))
     finally:
         running.send_signal(signal.SIGCONT)
         running.communicate()

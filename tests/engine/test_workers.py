@@ -1,7 +1,5 @@
 """Workers: the same bits on any number of them, and processes that end."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -9,14 +7,16 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from multiprocessing import active_children
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from recordings import ENVIRONMENT, assert_same, compiled_only, track, write_recording
+from recordings import ENVIRONMENT, assert_same, compiled_only, run_words, track, write_recording
+from refusals import Command
 
 from stseg.engine.workers import worker_processes
 from stseg.engine.workers.worker_processes import processes_that_fit
@@ -36,45 +36,45 @@ def test_any_number_of_workers_makes_the_same(rig_path: Path, undisturbed: Path,
     assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
 
 
-def test_a_worker_that_is_killed_is_replaced(rig_path: Path, undisturbed: Path, tmp_path: Path) -> None:
+@contextmanager
+def beside(work: Callable[[threading.Event], None]) -> Iterator[None]:
+    """Something goes on until the event that what stands below has ended."""
     over = threading.Event()
+    thread = threading.Thread(target=work, args=(over,))
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_a_worker_that_is_killed_is_replaced(rig_path: Path, undisturbed: Path, tmp_path: Path) -> None:
     killed: list[BaseProcess] = []
 
-    def kill() -> None:
+    def kill(over: threading.Event) -> None:
         while not killed and not over.wait(0.02):
             for child in active_children()[:1]:
                 child.kill()
                 killed.append(child)
 
-    killer = threading.Thread(target=kill)
-    killer.start()
-    try:
+    with beside(kill):
         assert track(rig_path, tmp_path / "run.h5", "--workers", "2") == 0
-    finally:
-        over.set()
-        killer.join()
     assert len(killed) == 1
     assert_same(tmp_path / "run.h5", undisturbed)
 
 
-def test_what_a_worker_finds_wrong_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_a_worker_finds_wrong_is_one_line(tmp_path: Path, refusal: Command) -> None:
     rig = write_recording(tmp_path)
     boxes = tmp_path / "east.csv"
     lines = boxes.read_text().splitlines()
     boxes.write_text("\n".join(line for line in lines if not line.startswith("39,")) + "\n")
     rig.write_text(rig.read_text().replace("frames = 40", "frames = 39", 1))
-    assert track(rig, tmp_path / "run.h5", "--workers", "2") == 2
-    told = capsys.readouterr().err
-    assert len(told.splitlines()) == 1
-    assert told.startswith("stseg: error:")
+    refusal(*run_words(rig, tmp_path / "run.h5", "--workers", "2"))
 
 
-def test_no_workers_are_refused(rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert track(rig_path, tmp_path / "run.h5", "--workers", "0") == 2
-    assert "--workers: found 0" in capsys.readouterr().err
-
-
-# A cluster on the loopback address
+def test_no_workers_are_refused(rig_path: Path, tmp_path: Path, refusal: Command) -> None:
+    assert "--workers: found 0" in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "0"))
 
 
 class Cluster(NamedTuple):
@@ -97,7 +97,12 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
         while not (found := re.search(r"tcp://127\.0\.0\.1:\d+", log.read_text())):
             assert time.monotonic() < deadline
             time.sleep(0.1)
-        started += [_cluster_worker(found[0], tmp_path / f"worker{k}") for k in range(2)]
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", found[0], "--host", "127.0.0.1"]
+        command += ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory"]
+        quiet, folders = subprocess.DEVNULL, [str(tmp_path / f"worker{k}") for k in range(2)]
+        started += [
+            subprocess.Popen([*command, folder], stderr=quiet, stdout=quiet, env=ENVIRONMENT) for folder in folders
+        ]
         yield Cluster(found[0], started[1:])
     finally:
         for process in started:
@@ -105,33 +110,19 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
             process.wait()
 
 
-def _cluster_worker(address: str, folder: Path) -> subprocess.Popen[bytes]:
-    folder.mkdir()
-    command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", "127.0.0.1"]
-    command += ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder)]
-    with (folder / "log").open("w") as file:
-        return subprocess.Popen(command, stderr=file, stdout=file, env=ENVIRONMENT)
-
-
 def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
     rig_path: Path, undisturbed: Path, tmp_path: Path, cluster: Cluster
 ) -> None:
     output = tmp_path / "run.h5"
     folder = tmp_path / "run.h5.segments"
-    over = threading.Event()
 
-    def kill() -> None:
+    def kill(over: threading.Event) -> None:
         while not list(folder.glob("segment-*-*.h5")) and not over.wait(0.02):
             pass
         cluster.workers[0].kill()
 
-    killer = threading.Thread(target=kill)
-    killer.start()
-    try:
+    with beside(kill):
         assert track(rig_path, output, "--scheduler", cluster.address) == 0
-    finally:
-        over.set()
-        killer.join()
     assert cluster.workers[0].wait() == -signal.SIGKILL
     assert cluster.workers[1].poll() is None
     assert_same(output, undisturbed)
@@ -140,9 +131,6 @@ def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
 def test_a_scheduler_that_is_not_there(rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert track(rig_path, tmp_path / "run.h5", "--scheduler", "tcp://127.0.0.1:9") == 2
     assert "no scheduler at tcp://127.0.0.1:9" in capsys.readouterr().err
-
-
-# Processes
 
 
 @pytest.fixture(autouse=True)

@@ -1,17 +1,16 @@
 """Valid files that fuzzing begins with: texts lie in the folder `files`, named as their targets; others are made."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from importlib import import_module
-from io import BytesIO, StringIO
+from io import StringIO
 from pathlib import Path
 
 import cv2
 import h5py
 import numpy as np
+from films import write_at_rate
 from run_files import write_small_run
 
 from stseg.arrays import AnyArray
@@ -32,24 +31,22 @@ def text(name: str) -> bytes:
     return (Path(__file__).parent / "files" / name).read_bytes()
 
 
-def mat(_: Path) -> bytes:
-    """A MATLAB file of version 5 with a 3x4 matrix."""
+def mat_file(rows: int = 3, columns: int = 4, size: int | None = None) -> bytes:
+    """A MATLAB file of version 5 with a 3x4 matrix; it may declare another shape, and another size of its content."""
     values = _MATRIX.astype("<f8").tobytes()
-    head = struct.pack("<IIII", 6, 8, 6, 0) + struct.pack("<IIii", 5, 8, 3, 4) + struct.pack("<HH4s", 1, 1, b"P\0\0\0")
+    head = struct.pack("<6I2i2H4s", 6, 8, 6, 0, 5, 8, rows, columns, 1, 1, b"P\0\0\0")
     body = head + struct.pack("<II", 9, len(values)) + values
-    return b"MATLAB".ljust(124) + b"\0\1IM" + struct.pack("<II", 14, len(body)) + body
+    return b"MATLAB".ljust(124) + b"\0\1IM" + struct.pack("<II", 14, len(body) if size is None else size) + body
 
 
-def npy(_: Path) -> bytes:
-    file = BytesIO()
-    np.save(file, _MATRIX)
-    return file.getvalue()
+def npy(folder: Path) -> bytes:
+    np.save(folder / "p.npy", _MATRIX)
+    return (folder / "p.npy").read_bytes()
 
 
-def npz(_: Path) -> bytes:
-    file = BytesIO()
-    np.savez_compressed(file, files=np.array([1], np.int64), times0_0=np.arange(9.0), P=_MATRIX)
-    return file.getvalue()
+def npz(folder: Path) -> bytes:
+    np.savez_compressed(folder / "p.npz", files=np.array([1], np.int64), times0_0=np.arange(9.0), P=_MATRIX)
+    return (folder / "p.npz").read_bytes()
 
 
 def matlab_hdf5(folder: Path) -> bytes:
@@ -62,25 +59,17 @@ def indexed_png(_: Path) -> bytes:
     return encode_indexed(_NUMBERS, np.zeros((256, 3), np.uint8))
 
 
-def grey_png(folder: Path) -> bytes:
-    return encoded(".png", _NUMBERS.astype(np.uint16))(folder)
-
-
 def encoded(suffix: str, picture: AnyArray) -> Maker:
     return lambda _: bytes(cv2.imencode(suffix, picture)[1])
 
 
+grey_png = encoded(".png", _NUMBERS.astype(np.uint16))
+
+
 def video(suffix: str, codec: str) -> Maker:
     """Four frames that grow brighter."""
-
-    def make(folder: Path) -> bytes:
-        writer = cv2.VideoWriter(str(folder / f"film{suffix}"), cv2.VideoWriter.fourcc(*codec), 10, (64, 48))
-        for frame in range(4):
-            writer.write(np.full((48, 64, 3), 20 * frame, np.uint8))
-        writer.release()
-        return (folder / f"film{suffix}").read_bytes()
-
-    return make
+    frames = [np.full((48, 64, 3), 20 * frame, np.uint8) for frame in range(4)]
+    return lambda folder: write_at_rate(folder / f"film{suffix}", frames, codec=codec).read_bytes()
 
 
 def parquet(folder: Path) -> bytes:

@@ -1,7 +1,5 @@
 """Mutations of files: bytes, text and HDF5."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from io import BytesIO

@@ -4,8 +4,6 @@
 printed with its seed, and kept in the folder `fuzz-failures`.
 """
 
-from __future__ import annotations
-
 import argparse
 import mmap
 import os

@@ -1,11 +1,10 @@
 """One target for each parser and reader: a valid file, and the call that reads it."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
+from functools import partial
 from io import StringIO
 from pathlib import Path
 
@@ -48,24 +47,16 @@ Reader = Callable[[Path], object]
 
 @dataclass(frozen=True)
 class Target:
-    """A reader that is fuzzed.
-
-    Attributes
-    ----------
-    name
-        Of the target; its suffix is that of the file.
-    read
-        Reads a file; raises StsegError for what it does not take.
-    make
-        Makes a valid file, which `read` takes without an error; the text of the target's name where it is None.
-    mutate
-        Makes another file of a valid one.
-    """
+    """A reader that is fuzzed."""
 
     name: str
+    """Of the target; its suffix is that of the file."""
     read: Reader
+    """Reads a file; raises StsegError for what it does not take."""
     make: Maker | None = None
+    """Makes a valid file, which `read` takes without an error; the text of the target's name where it is None."""
     mutate: Callable[[bytes, np.random.Generator], bytes] = mutated
+    """Makes another file of a valid one."""
 
     @property
     def suffix(self) -> str:
@@ -99,9 +90,7 @@ _NOTES = {"config": {"a": 1}, "rig": {"b": "c"}}
 def _frames_of(source: Source) -> None:
     """Read the first frames."""
     stream = open_stream(source, CAMERA)
-    for _ in range(_FRAMES):
-        if stream.read() is None:
-            break
+    any(stream.read() is None for _ in range(_FRAMES))
     stream.close()
 
 
@@ -134,8 +123,8 @@ def _in_folder(name: str, kind: SourceKind = "boxes", first: str = "", view: int
     return read
 
 
-def _importer(format: str) -> Reader:
-    return lambda path: read_cameras(format, [path], OPTIONS)
+def _cameras(format: str, path: Path) -> None:
+    read_cameras(format, [path], OPTIONS)
 
 
 def _picture(kind: SourceKind) -> Reader:
@@ -189,16 +178,8 @@ def _begun(path: Path) -> None:
 
 
 def _live_table(path: Path) -> None:
-    copy = path.with_name("live.csv")
-    copy.write_bytes(path.read_bytes())
-    with LiveTable(copy, 10.0, 5):
+    with LiveTable(Path(shutil.copy(path, path.with_name("live.csv"))), 10.0, 5):
         pass
-
-
-def _live_corrections(path: Path) -> None:
-    copy = path.with_name("live_corrections.csv")
-    copy.write_bytes(path.read_bytes())
-    CorrectionTable(copy, 90)
 
 
 def _zones(path: Path) -> None:
@@ -236,6 +217,16 @@ def _calibration_page(path: Path) -> None:
         calibrate_page(path, output=path.with_name("page.html"), area="0,0,4,3", plan=path, overwrite=True)
 
 
+_CALIBRATIONS: tuple[tuple[str, str, Maker | None], ...] = (
+    ("matrix", "matrix.txt", None),
+    ("matrix", "matrix.npy", corpus.npy),
+    ("matrix", "matrix.npz", corpus.npz),
+    ("matrix", "matrix.mat", lambda _: corpus.mat_file()),
+    ("matrix", "matrix_hdf5.mat", corpus.matlab_hdf5),
+    *((Path(name).stem, name, None) for name in ("opencv.xml", "tsai.xml", "pom.txt", "krt.json", "nvidia.json")),
+    ("anipose", "poses.toml", None),
+    ("kalibr", "kalibr.yaml", None),
+)
 TARGETS = (
     Target("boxes.csv", _frames("boxes")),
     Target("mot.txt", _frames("boxes")),
@@ -270,25 +261,14 @@ TARGETS = (
     Target("answers.csv", _answers),
     Target("names.csv", _names),
     *(Target(f"floor_plan{suffix}", _calibration_page, encoded(suffix, GREY)) for suffix in (".png", ".jpg")),
-    Target("matrix.txt", _importer("matrix")),
-    Target("matrix.npy", _importer("matrix"), corpus.npy),
-    Target("matrix.npz", _importer("matrix"), corpus.npz),
-    Target("matrix.mat", _importer("matrix"), corpus.mat),
-    Target("matrix_hdf5.mat", _importer("matrix"), corpus.matlab_hdf5),
-    Target("opencv.xml", _importer("opencv")),
-    Target("tsai.xml", _importer("tsai")),
-    Target("pom.txt", _importer("pom")),
-    Target("krt.json", _importer("krt")),
-    Target("poses.toml", _importer("anipose")),
-    Target("nvidia.json", _importer("nvidia")),
-    Target("kalibr.yaml", _importer("kalibr")),
+    *(Target(name, partial(_cameras, format), make) for format, name, make in _CALIBRATIONS),
     Target("run.h5", _run, corpus.small_run),
     Target("run_objects.h5", _used_run, corpus.small_run, mutated_objects),
     Target("streams.npz", _streams, corpus.npz),
     Target("begun.json", _begun),
     Target("files.json", FileNotes),
     Target("live.table.csv", _live_table),
-    Target("live.corrections.csv", _live_corrections),
+    Target("live.corrections.csv", lambda path: CorrectionTable(Path(shutil.copy(path, path.with_name("copy"))), 90)),
     Target("indexed.png", _picture("instances"), corpus.indexed_png),
     Target("grey.png", _picture("instances"), corpus.grey_png),
     Target("mask.png", _picture("masks"), corpus.indexed_png),

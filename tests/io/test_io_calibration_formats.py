@@ -1,7 +1,5 @@
 """Every foreign format shows known ground points where its own model, written out here, does."""
 
-from __future__ import annotations
-
 import json
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -12,6 +10,7 @@ import pytest
 from recordings import data_path
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
 from refusals import refused
+from scenes import rotation_towards
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 from strategies import BARREL
@@ -32,22 +31,24 @@ MATRIX = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])
 DISTORTION = np.array(BARREL)
 GROUND = np.stack(np.meshgrid(np.linspace(-1.5, 1.5, 5), np.linspace(-1.5, 1.5, 5)), -1).reshape(-1, 2)
 HEIGHTS = np.linspace(0.0, 1.8, 25)
+POINTS = np.column_stack([GROUND, HEIGHTS])
+
+
+@pytest.fixture(autouse=True)
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder of a test is that of its commands."""
+    monkeypatch.chdir(tmp_path)
 
 
 def pose(turn: float, metres: float = 1.0) -> tuple[Floats, Floats]:
     """Rodrigues vector and translation of a camera 4 m away and 2.2 m high that looks at the origin, Z up."""
     centre = np.array([4 * np.cos(turn), 4 * np.sin(turn), 2.2])
-    forward = np.array([0.0, 0.0, 0.8]) - centre
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
+    rotation = rotation_towards(centre, [0.0, 0.0, 0.8])
     return np.asarray(Rotation.from_matrix(rotation).as_rotvec()), -rotation @ centre / metres
 
 
 def expected(turn: float, distortion: Floats) -> Floats:
-    points = np.column_stack([GROUND, HEIGHTS])
-    return project_by_opencv(MATRIX, distortion, *pose(turn), points)
+    return project_by_opencv(MATRIX, distortion, *pose(turn), POINTS)
 
 
 def pixels(foreign: ForeignCamera, world: World) -> Floats:
@@ -57,8 +58,7 @@ def pixels(foreign: ForeignCamera, world: World) -> Floats:
 def krt(path: Path) -> Path:
     cameras = {}
     for k in range(3):
-        rotation, translation = pose(k)
-        extrinsic = matrix_of(np.eye(3), rotation, translation)
+        extrinsic = matrix_of(np.eye(3), *pose(k))
         cameras[str(k)] = {"K": MATRIX.ravel().tolist(), "RT": extrinsic.ravel().tolist(), "imgSize": list(SIZE)}
     path.write_text(json.dumps(cameras))
     return path
@@ -118,9 +118,8 @@ class TestStructured:
 
     def test_names_are_the_files(self, tmp_path: Path) -> None:
         assert [camera.name for camera in read_krt_json([krt(tmp_path / "c.json")])] == ["0", "1", "2"]
-        assert [camera.name for camera in read_pose_toml([pose_toml(tmp_path / "c", "cam_", False)])] == [
-            *("view0", "view1", "view2")
-        ]
+        cameras = read_pose_toml([pose_toml(tmp_path / "c", "cam_", False)])
+        assert [camera.name for camera in cameras] == ["view0", "view1", "view2"]
 
     @pytest.mark.parametrize(
         ("old", "new", "complaint"),
@@ -140,57 +139,46 @@ class TestStructured:
     def test_a_homography_alone_is_sent_to_points(self, tmp_path: Path) -> None:
         path = tmp_path / "calibration.json"
         path.write_text(json.dumps({"sensors": [{"id": "a", "homography": np.eye(3).tolist()}]}))
-        with pytest.raises(FormatError, match=r"sensors\[0\].cameraMatrix: found nothing, .* `stseg calibrate points`"):
-            read_nvidia_json([path])
+        said = r"sensors\[0\].cameraMatrix: found nothing, .* `stseg calibrate points`"
+        refused(FormatError, said, read_nvidia_json, [path])
 
     def test_a_chain_hangs_on_its_first_camera(self, tmp_path: Path) -> None:
         pytest.importorskip("yaml")
-        first = np.vstack([matrix_of(np.eye(3), *pose(0.0)), [0, 0, 0, 1]])
-        before, lines = first, []
+        poses = [np.vstack([matrix_of(np.eye(3), *pose(k)), [0, 0, 0, 1]]) for k in range(3)]
+        lines = []
         for k in range(3):
-            own = np.vstack([matrix_of(np.eye(3), *pose(float(k))), [0, 0, 0, 1]])
             lines += [f"cam{k}:", "  camera_model: pinhole", "  distortion_model: radtan"]
             lines += [f"  distortion_coeffs: {list(BARREL[:4])}", "  intrinsics: [500.0, 510.0, 320.0, 240.0]"]
             lines += ["  resolution: [640, 480]", f"  rostopic: /cam{k}/image_raw"]
             if k:
-                lines += ["  T_cn_cnm1:", *(f"  - {row}" for row in (own @ np.linalg.inv(before)).tolist())]
-            before = own
+                step = poses[k] @ np.linalg.inv(poses[k - 1])
+                lines += ["  T_cn_cnm1:", *(f"  - {row}" for row in step.tolist())]
         path = tmp_path / "camchain.yaml"
         path.write_text("\n".join(lines))
         cameras = read_kalibr_yaml([path])
-        points = np.column_stack([GROUND, HEIGHTS, np.ones(25)])
         for k, camera in enumerate(cameras):
-            in_world = ForeignCamera(path, "", SIZE, camera.projection @ first, camera.lens)
+            in_world = ForeignCamera(path, "", SIZE, camera.projection @ poses[0], camera.lens)
             want = expected(k, np.array(BARREL[:4]))
             np.testing.assert_allclose(pixels(in_world, World()), want, rtol=0, atol=1e-6)
-        assert points.shape == (25, 4)
         path.write_text(path.read_text().replace("radtan", "equidistant"))
         refused(FormatError, r"cam0.camera_model: found pinhole-equidistant", read_kalibr_yaml, [path])
 
 
 def tsai_pixels(file: Path, points: Floats) -> Floats:
-    """Tsai's model from the raw attributes, in millimetres; the distorted radius by bisection where it rises.
+    """Tsai's model from the raw attributes, in millimetres; the distorted radius where it rises.
 
     nan near the radius at which the model turns round, which is steep there: only the corners of view 7 come so far.
     """
     root = ElementTree.parse(file).getroot()
     values = {name: float(value) for node in root for name, value in node.attrib.items()}
-    rx, ry, rz = values["rx"], values["ry"], values["rz"]
-    about_x = np.array([[1, 0, 0], [0, np.cos(rx), -np.sin(rx)], [0, np.sin(rx), np.cos(rx)]])
-    about_y = np.array([[np.cos(ry), 0, np.sin(ry)], [0, 1, 0], [-np.sin(ry), 0, np.cos(ry)]])
-    about_z = np.array([[np.cos(rz), -np.sin(rz), 0], [np.sin(rz), np.cos(rz), 0], [0, 0, 1]])
-    seen = points @ (about_z @ about_y @ about_x).T + [values["tx"], values["ty"], values["tz"]]
+    rotation = Rotation.from_euler("xyz", [values[name] for name in ("rx", "ry", "rz")])
+    seen = rotation.apply(points) + np.array([values["tx"], values["ty"], values["tz"]])
     plain = values["focal"] * seen[:, :2] / seen[:, 2:]
-    shown = []
-    turn = 1 / np.sqrt(3 * max(-values["kappa1"], 1e-3))
-    for point in plain:
-        radius, low, high = float(np.hypot(*point)), 0.0, turn
-        for _ in range(80):
-            middle = (low + high) / 2
-            low, high = (middle, high) if middle * (1 + values["kappa1"] * middle**2) < radius else (low, middle)
-        u, v = point / radius * (low if low < 0.85 * turn else np.nan) if radius else point
-        shown.append((values["sx"] * u / values["dpx"] + values["cx"], v / values["dpy"] + values["cy"]))
-    return np.array(shown)
+    turn, radius = 1 / np.sqrt(3 * max(-values["kappa1"], 1e-3)), np.hypot(*plain.T)
+    distorted = np.linspace(0.0, turn, 1_000_000)
+    shown = np.interp(radius, distorted * (1 + values["kappa1"] * distorted**2), distorted)
+    u, v = plain.T / radius * np.where(shown < 0.85 * turn, shown, np.nan)
+    return np.column_stack([values["sx"] * u / values["dpx"] + values["cx"], v / values["dpy"] + values["cy"]])
 
 
 class TestTsai:
@@ -206,9 +194,9 @@ class TestTsai:
             assert seen.sum() > 100
             points = 1000.0 * np.column_stack([ground[seen], np.full(int(seen.sum()), height)])
             want = tsai_pixels(file, points)
-            messages = np.isfinite(want).all(axis=1)
-            assert messages.mean() > (0.8 if view == 7 else 0.999)
-            np.testing.assert_allclose(pixel[seen][messages], want[messages], rtol=0, atol=0.01)
+            known = np.isfinite(want).all(axis=1)
+            assert known.mean() > (0.8 if view == 7 else 0.999)
+            np.testing.assert_allclose(pixel[seen][known], want[known], rtol=0, atol=0.01)
 
     def test_refuses_and_names_the_node(self, tmp_path: Path) -> None:
         file = tmp_path / "view.xml"
@@ -228,7 +216,7 @@ class TestKrtData:
             camera = World().camera(foreign, foreign.name, foreign.size or SIZE)
             pixel, ahead = camera.project(GROUND, HEIGHTS)
             assert ahead.sum() > 10
-            want = project_by_matrix(matrix, np.column_stack([GROUND, HEIGHTS]))
+            want = project_by_matrix(matrix, POINTS)
             np.testing.assert_allclose(pixel[ahead], want[ahead], rtol=0, atol=1e-6)
 
 
@@ -259,10 +247,7 @@ class TestPom:
         assert ahead.all()
         np.testing.assert_allclose(pixel, expected(2, np.zeros(5)), rtol=0, atol=1e-6)
 
-    def test_by_command_a_mirrored_grid_is_named(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        monkeypatch.chdir(tmp_path)
+    def test_by_command_a_mirrored_grid_is_named(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         files = [self.files(tmp_path, turn).name for turn in (0, 2)]
         scene = ("--size=640,480", "--unit=0.25", "--up=+z", "-o=r.toml")
         refused(CalibrationError, r"handedness: found a mirrored world.*--mirrored", run, "pom", *files, *scene)
@@ -300,16 +285,16 @@ class TestGuesses:
 
     @pytest.mark.parametrize(("given", "true", "hint"), [("m", 0.001, "mm"), ("mm", 1.0, "m"), ("m", 0.01, "cm")])
     def test_a_wrong_unit_is_named(self, given: str, true: float, hint: str) -> None:
-        with pytest.raises(CalibrationError, match=rf"--unit {given}: .* are its lengths in {hint}\?"):
-            require_median_height(turned("+z", true), World(given))
+        said = rf"--unit {given}: .* are its lengths in {hint}\?"
+        refused(CalibrationError, said, require_median_height, turned("+z", true), World(given))
 
     def test_a_mirrored_world_is_named(self) -> None:
         mirror = np.diag([1.0, -1.0, 1.0, 1.0])
         cameras = [ForeignCamera(c.file, c.name, SIZE, c.projection @ mirror) for c in turned("+z", 1.0)]
         refused(CalibrationError, r"cameras below the ground .*--mirrored", guess_unit, cameras, guess_up(cameras))
         rotation = Rotation.from_rotvec(pose(0)[0]).as_matrix() @ mirror[:3, :3]
-        with pytest.raises(CalibrationError, match=r"rotation: found a mirror"):
-            camera_from_pose(Path("c"), "a", SIZE, MATRIX, np.asarray(rotation), pose(0)[1], np.zeros(5))
+        read = (Path("c"), "a", SIZE, MATRIX, np.asarray(rotation), pose(0)[1], np.zeros(5))
+        refused(CalibrationError, r"rotation: found a mirror", camera_from_pose, *read)
 
     @pytest.mark.parametrize("unit", ["km", "-1", "nan", "0"])
     def test_no_unit(self, unit: str) -> None:
@@ -322,10 +307,7 @@ def run(*tokens: str) -> None:
 
 
 class TestCommand:
-    def test_nothing_but_the_file(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        monkeypatch.chdir(tmp_path)
+    def test_nothing_but_the_file(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         pose_toml(tmp_path / "c.toml", "cam_")
         run("anipose", "c.toml", "-o=r.toml")
         cameras: tuple[Camera, ...] = read_recording("r.toml").rig.cameras
@@ -341,14 +323,10 @@ class TestCommand:
             ("--mirrored", r"mirrored|below the ground"),
         ],
     )
-    def test_says_what_to_mend(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str, complaint: str
-    ) -> None:
-        monkeypatch.chdir(tmp_path)
+    def test_says_what_to_mend(self, tmp_path: Path, option: str, complaint: str) -> None:
         pose_toml(tmp_path / "c.toml", "cam_")
         refused(InputError, complaint, run, "caliscope", "c.toml", "-o=r.toml", option)
 
-    def test_a_size_is_asked_for(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.chdir(tmp_path)
+    def test_a_size_is_asked_for(self, tmp_path: Path) -> None:
         pose_toml(tmp_path / "c.toml", "cam_", size=False)
         refused(ConfigError, r"--size: found nothing, .*c.toml does not say it", run, "pose2sim", "c.toml", "-o=r.toml")

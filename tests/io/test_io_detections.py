@@ -1,7 +1,5 @@
 """Detections as detectors and annotation tools write them: each format is recognised, and its malformed twin named."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -9,36 +7,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from attacks import write_rig
 from refusals import refused
 
+from stseg.commands.inspect import inspect
 from stseg.errors import FormatError, InputError, RigError, SourceError
+from stseg.geometry import Camera
 from stseg.io.detections.masks import flat_polygons, run_lengths
 from stseg.io.detections.record import listed_frames
 from stseg.io.detections.source_detections import read_source
 from stseg.io.recording.recording import Source
+from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.streams import open_stream
 
 SIZE = (80, 60)
 BOXES = {0: [(10.0, 12.0, 20.0, 30.0, 0.9)], 2: [(5.0, 6.0, 10.0, 24.0, 0.5), (40.0, 8.0, 16.0, 40.0, 0.25)]}
 """By frame: left, top, width, height, score."""
-RIG = """format = 1
-[scene]
-name = "s"
-frame_rate = 5.0
-x = [-1.0, 1.0]
-y = [-1.0, 1.0]
-[grid]
-cell = 0.1
-top = 1.8
-planes = 3
-[[camera]]
-name = "a"
-size = [80, 60]
-projection = [[40.0, 0, -39.5, 200], [0, -40.0, -29.5, 150], [0, 0, -1.0, 5]]
-source = { kind = "boxes", path = "PATH" }
-"""
-
-
 SAMPLES = Path(__file__).parent / "detections"
 """A folder a format, with the boxes as its program writes them."""
 FORMATS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -145,8 +129,8 @@ def test_broken_parquet_and_unknown_json_are_named(tmp_path: Path) -> None:
     (tmp_path / "b.parquet").write_bytes(b"no")
     refused(FormatError, "no Parquet", read_source, Source("boxes", tmp_path / "b.parquet"), SIZE)
     (tmp_path / "x.json").write_text('{"a": 1}')
-    with pytest.raises(FormatError, match="of no known detections, expected one of Ultralytics text, WILDTRACK"):
-        read_source(Source("boxes", tmp_path / "x.json"), SIZE)
+    said = "of no known detections, expected one of Ultralytics text, WILDTRACK"
+    refused(FormatError, said, read_source, Source("boxes", tmp_path / "x.json"), SIZE)
     (tmp_path / "y.json").write_text("{\n no json")
     refused(FormatError, r"y.json: line 2: found no JSON", read_source, Source("boxes", tmp_path / "y.json"), SIZE)
 
@@ -157,8 +141,8 @@ def test_classes_and_scores_choose(tmp_path: Path) -> None:
     assert both.read.classes() == {"person": 3, "car": 2}
     assert len(read_source(Source("boxes", made.path, 1, classes=("car",)), SIZE).kept) == 2
     assert len(read_source(Source("boxes", made.path, 1, least_score=0.6), SIZE).kept) == 3
-    with pytest.raises(SourceError, match=r"no detections of persn; classes are person \(3\), car \(2\)"):
-        read_source(Source("boxes", made.path, 1, classes=("persn",)), SIZE)
+    said = r"no detections of persn; classes are person \(3\), car \(2\)"
+    refused(SourceError, said, read_source, Source("boxes", made.path, 1, classes=("persn",)), SIZE)
 
 
 def test_ground_truth_of_motchallenge_keeps_its_flag_and_classes(tmp_path: Path) -> None:
@@ -187,7 +171,8 @@ def test_run_lengths_are_cocos() -> None:
     refused(ValueError, "for an image of 8 x 7", run_lengths, [7, 8], "=331OO10;")
 
 
-def test_masks_become_instances(tmp_path: Path, camera: Any) -> None:
+def test_masks_become_instances(tmp_path: Path) -> None:
+    camera = Camera.from_projection("a", SIZE, np.array([[50.0, 0, 0, 0], [0, -50, 0, 0], [0, 0, -1, 5]]))
     rows = json.loads((SAMPLES / "coco_results" / "results.json").read_text())
     rows[0]["segmentation"] = [[10, 12, 30, 12, 30, 42, 10, 42]]
     rows[1]["segmentation"] = {"size": [60, 80], "counts": [0, 60, 4740]}
@@ -199,13 +184,6 @@ def test_masks_become_instances(tmp_path: Path, camera: Any) -> None:
     assert isinstance(empty, np.ndarray) and not empty.any()
     assert isinstance(third, np.ndarray) and third[30, 0] == 2 and third[30, 2] == 1, "the better score is on top"
     assert end is None
-
-
-@pytest.fixture
-def camera() -> Any:
-    from stseg.geometry import Camera
-
-    return Camera.from_projection("a", SIZE, np.array([[50.0, 0, 0, 0], [0, -50, 0, 0], [0, 0, -1, 5]]))
 
 
 def test_polygons_need_three_points() -> None:
@@ -221,32 +199,26 @@ def test_images_at_equal_steps_are_consecutive_frames() -> None:
 
 
 def test_the_rig_names_a_wrong_key(tmp_path: Path) -> None:
-    from stseg.io.recording.rigs import read_recording
-
-    text = RIG.replace('"PATH"', '"x.json", SOURCE') + 'images = { kind = "video", path = "x.mp4" }\n'
-    path = tmp_path / "rig.toml"
-    path.write_text(text.replace("SOURCE", 'classes = ["person"], score = 0.3, columns = { frame = "t" }'))
+    old, new = '"boxes.csv" }', '"x.json", SOURCE }\nimages = { kind = "video", path = "x.mp4" }'
+    keys = 'classes = ["person"], score = 0.3, columns = { frame = "t" }'
+    path = write_rig(tmp_path, old, new.replace("SOURCE", keys))
     (own,) = read_recording(path).sources
     assert own.source.classes == ("person",) and own.source.least_score == 0.3 and own.images is not None
     assert read_recording(path).pictured().sources[0].source.kind == "video"
     for wrong, message in (("score = 3", "a number of 0..1"), ('columns = { frme = "t" }', "did you mean frame")):
-        path.write_text(text.replace("SOURCE", wrong))
-        refused(RigError, message, read_recording, path)
+        refused(RigError, message, read_recording, write_rig(tmp_path, old, new.replace("SOURCE", wrong)))
 
 
 def test_inspect_says_what_a_rig_delivers_and_draws_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from stseg.commands.inspect import inspect
-
     monkeypatch.setenv("COLUMNS", "200")
     sample(tmp_path, "Ultralytics text")
-    rig = tmp_path / "rig.toml"
-    rig.write_text(RIG.replace("PATH", "labels"))
+    rig = write_rig(tmp_path, '"boxes.csv"', '"labels"')
     inspect(rig, output=tmp_path / "pictures")
     printed = capsys.readouterr().out
     assert "Ultralytics text" in printed and "person 3, car 2" in printed
     assert "do its frames count from 1? (first_frame = 1)" in printed
-    assert (tmp_path / "pictures" / "a.png").stat().st_size > 1000
+    assert (tmp_path / "pictures" / "cam1.png").stat().st_size > 1000
     (tmp_path / "labels" / "walk_1.txt").write_text("0 0.5\n")
     refused(FormatError, r"walk_1\.txt, line 1", inspect, rig)

@@ -1,17 +1,19 @@
 """Arriving files and live streams as frame sets: files lose no frame, cameras none without a message."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from threading import Event, current_thread
+from threading import Event, Timer, current_thread
 
 import numpy as np
 import pytest
-from arrivals import FRAMES, PIECE, PLACES, StandIn, arrive, filmed_rig, meanwhile, write_pieces, write_video
+from arrivals import PIECE, StandIn, arrive, meanwhile, write_pieces
+from films import write_at_rate
+from recordings import FRAMES, PLACES, filmed_rig
+from refusals import refused
 
 from stseg.arrays import AnyArray, Bytes
 from stseg.config import LiveConfig
@@ -22,7 +24,7 @@ from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
 from stseg.io.live.live_stream import Capture, is_live, now
 from stseg.io.recording.aligned_stream import index_streams
-from stseg.io.recording.frames import FrameSet, open_frames
+from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig, read_recording
@@ -42,11 +44,9 @@ def arriving(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def followed(rig: Path, first: int, stop: int | None, notes: FileNotes, say: Callable[[str], None]) -> FollowedFiles:
-    return FollowedFiles(read_recording(rig), first, stop, QUICK, notes, Event(), say)
-
-
-# Files
+def followed(rig: Path, folder: Path, first: int = 0, stop: int | None = None) -> FollowedFiles:
+    """The files of a rig, with notes in a folder."""
+    return FollowedFiles(read_recording(rig), first, stop, QUICK, FileNotes(folder / "files.json"), Event(), print)
 
 
 def test_files_are_taken_in_order_once_they_are_complete(tmp_path: Path) -> None:
@@ -57,62 +57,51 @@ def test_files_are_taken_in_order_once_they_are_complete(tmp_path: Path) -> None
     begun = time.monotonic()
     assert [files.next(), files.next()] == [tmp_path / "cam_9.mp4", tmp_path / "cam_10.mp4"]
     assert time.monotonic() - begun < 0.3
-    growing = meanwhile(partial(_add, tmp_path / "cam_11.mp4"))
+    growing = meanwhile(partial(add_to, tmp_path / "cam_11.mp4"))
     assert files.next() == tmp_path / "cam_11.mp4"
     assert not growing.is_alive()
     assert time.monotonic() - begun > 0.6
     (tmp_path / "cam_8.mp4").write_bytes(b"late")
     (tmp_path / "cam_12.mp4").write_bytes(b"")
-    meanwhile(partial(_later, halt, 0.5))
+    Timer(0.5, halt.set).start()
     assert files.next() is None  # nothing was ever added to it
     assert [line.split(":")[0] for line in reported] == [str(tmp_path / "cam_8.mp4")]
 
 
-def _add(path: Path) -> None:
+def add_to(path: Path) -> None:
     for _ in range(4):
         time.sleep(0.1)
         with path.open("ab") as file:
             file.write(b"more")
 
 
-def _later(halt: Event, seconds: float) -> None:
-    time.sleep(seconds)
-    halt.set()
-
-
 def test_files_that_arrive_show_what_they_show_afterwards(arriving: Path, tmp_path: Path) -> None:
     recording = read_recording(arriving)
     assert index_streams(recording).length == FRAMES
     for first in (0, 13):
-        notes = FileNotes(tmp_path / "files.json")
-        with open_frames(recording, first) as after, followed(arriving, first, FRAMES, notes, print) as frame_sets:
+        with open_frames(recording, first) as after, followed(arriving, tmp_path, first, FRAMES) as frame_sets:
             for expected, frame_set in zip(after, frame_sets, strict=True):
                 assert frame_set.frame == expected.frame
                 assert now() - 60 < frame_set.arrived < now()
                 np.testing.assert_array_equal(np.stack(frame_set.views), np.stack(expected.views))  # type: ignore[arg-type]
-    assert notes.read["east"] == [(f"east_{k}.avi", PIECE) for k in (1, 2, 3)]
+    assert FileNotes(tmp_path / "files.json").read["east"] == [(f"east_{k}.avi", PIECE) for k in (1, 2, 3)]
 
 
 def test_files_that_were_read_may_go(tmp_path: Path) -> None:
     rig = write_pieces(tmp_path, empty=True)
     arrive(tmp_path, 1, 2, 3)
-    notes = FileNotes(tmp_path / "files.json")
-    with followed(rig, 0, 25, notes, print) as frame_sets:
+    with followed(rig, tmp_path, 0, 25) as frame_sets:
         expected = list(frame_sets)[22]
     for name in PLACES:
         (tmp_path / "in" / f"{name}_1.avi").unlink()
-    with followed(rig, 22, 23, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+    with followed(rig, tmp_path, 22, 23) as frame_sets:
         (frame_set,) = frame_sets
     np.testing.assert_array_equal(np.stack(frame_set.views), np.stack(expected.views))  # type: ignore[arg-type]
-    with (
-        followed(rig, 5, 23, FileNotes(tmp_path / "files.json"), print) as frame_sets,
-        pytest.raises(SourceError) as error,
-    ):
-        next(frame_sets)
-    assert error.value.expected.startswith("west_1.avi")
+    with followed(rig, tmp_path, 5, 23) as frame_sets:
+        refused(SourceError, r"expected west_1\.avi", next, frame_sets)
 
 
-def test_reading_waits_for_whoever_takes_the_moments(
+def test_reading_waits_for_whoever_takes_the_frames(
     arriving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read, whole = list[int](), VideoStream.read
@@ -122,7 +111,7 @@ def test_reading_waits_for_whoever_takes_the_moments(
         return whole(stream)
 
     monkeypatch.setattr(VideoStream, "read", counted)
-    with followed(arriving, 0, FRAMES, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+    with followed(arriving, tmp_path, 0, FRAMES) as frame_sets:
         for count, frame_set in enumerate(frame_sets, 1):
             if count < 4:
                 time.sleep(0.1)
@@ -136,24 +125,20 @@ def test_a_file_that_was_not_complete_is_told(tmp_path: Path) -> None:
     arrive(tmp_path, 1)
     content = (tmp_path / "pieces" / "east_1.avi").read_bytes()
     (tmp_path / "in" / "east_1.avi").write_bytes(content[: len(content) // 2])
-    with followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+    said = rf"{len(content)} bytes, of which only the first .* expected live\.file_quiet_time above"
+    with followed(rig, tmp_path) as frame_sets:
         next(frame_sets)
         arrive(tmp_path, 1, 2)
-        with pytest.raises(
-            SourceError, match=rf"{len(content)} bytes, of which only the first .* expected live\.file_quiet_time above"
-        ):
-            list(frame_sets)
+        refused(SourceError, said, lambda: list(frame_sets))
 
 
 def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
     rig, reported = write_pieces(tmp_path, empty=True), list[str]()
     arrive(tmp_path, 1)
     (tmp_path / "in" / "east_1.avi").unlink()
-    halt = Event()
-    meanwhile(partial(_later, halt, 1.6))
-    with FollowedFiles(
-        read_recording(rig), 0, None, QUICK, FileNotes(tmp_path / "files.json"), halt, reported.append
-    ) as frame_sets:
+    halt, notes = Event(), FileNotes(tmp_path / "files.json")
+    Timer(1.6, halt.set).start()
+    with FollowedFiles(read_recording(rig), 0, None, QUICK, notes, halt, reported.append) as frame_sets:
         assert list(frame_sets) == []
     assert reported == ["waiting for the next file of east, at frame 0"]
 
@@ -170,11 +155,8 @@ def test_what_cannot_be_followed_is_refused(arriving: Path, source: Source) -> N
     recording = read_recording(arriving)
     assert not is_live(recording)
     assert is_live(live())
-    with pytest.raises(SourceError, match="by a pattern"):
-        is_live(replace(recording, sources=(CameraSource(source), *recording.sources[1:])))
-
-
-# Live cameras
+    other = replace(recording, sources=(CameraSource(source), *recording.sources[1:]))
+    refused(SourceError, "by a pattern", is_live, other)
 
 
 def numbered(number: int, count: int = 200) -> list[Bytes]:
@@ -193,18 +175,8 @@ def live(offsets: tuple[int, ...] = (0, 0)) -> Recording:
 
 def opening(*cameras: StandIn) -> Callable[[str, float], Capture]:
     """Each thread opens its own camera, the same one whenever it does."""
-    own: dict[str, StandIn] = {}
-
-    def open_own(address: str, silence: float) -> Capture:
-        name = current_thread().name
-        names = [f"camera {place}" for place in PLACES]
-        return own.setdefault(name, cameras[names.index(name)]).open(address, silence)
-
-    return open_own
-
-
-def taken(frame_sets: FollowedCameras, count: int) -> list[FrameSet]:
-    return [next(frame_sets) for _ in range(count)]
+    own = dict(zip([f"camera {place}" for place in PLACES], cameras, strict=False))
+    return lambda address, silence: own[current_thread().name].open(address, silence)
 
 
 def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
@@ -212,7 +184,7 @@ def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
     cameras = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.025))
     cameras[1].begun = cameras[0].begun
     with FollowedCameras(live((0, -5)), QUICK, None, Event(), print, opening(*cameras)) as frame_sets:
-        some = taken(frame_sets, 20)
+        some = list(islice(frame_sets, 20))
     assert [frame_set.frame for frame_set in some] == list(range(20))
     assert frame_sets.dropped == 0
     shown = np.array([[int(view[0, 0, 0]) for view in frame_set.views if view is not None] for frame_set in some])  # type: ignore[index]
@@ -226,7 +198,7 @@ def test_a_broken_stream_is_reopened_with_growing_pauses() -> None:
     steady, breaking = StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05, breaks=[30], refused=3)
     reported = list[str]()
     with FollowedCameras(live(), QUICK, None, Event(), reported.append, opening(steady, breaking)) as frame_sets:
-        some = taken(frame_sets, 50)
+        some = list(islice(frame_sets, 50))
     blind = [k for k, frame_set in enumerate(some) if frame_set.views[1] is None]
     assert blind
     assert blind == list(range(blind[0], blind[-1] + 1))
@@ -260,22 +232,15 @@ def test_a_full_queue_drops_its_oldest_frame_sets() -> None:
 
 
 def test_a_run_that_goes_on_keeps_its_clock() -> None:
-    with FollowedCameras(
-        live((0,)), QUICK, now() - 100, Event(), print, opening(StandIn(numbered(0), 0.05))
-    ) as frame_sets:
+    connect = opening(StandIn(numbered(0), 0.05))
+    with FollowedCameras(live((0,)), QUICK, now() - 100, Event(), print, connect) as frame_sets:
         assert 2000 < next(frame_sets).frame < 2100
 
 
 def test_pictures_of_another_size_end_the_run() -> None:
     wrong = StandIn([np.zeros((10, 10, 3), np.uint8)], 0.05)
-    with (
-        FollowedCameras(live((0,)), QUICK, None, Event(), print, opening(wrong)) as frame_sets,
-        pytest.raises(SourceError, match="10x10"),
-    ):
-        next(frame_sets)
-
-
-# What the rig file says of live cameras
+    with FollowedCameras(live((0,)), QUICK, None, Event(), print, opening(wrong)) as frame_sets:
+        refused(SourceError, "10x10", next, frame_sets)
 
 
 def test_an_address_in_the_rig_file(tmp_path: Path) -> None:
@@ -287,11 +252,8 @@ def test_an_address_in_the_rig_file(tmp_path: Path) -> None:
     provenance = gather_provenance(recording, "")
     assert "secret" not in provenance.rig + str(provenance.sources)
     assert "rtsp://me:***@there:554/live?channel=1" in provenance.rig
-    with pytest.raises(SourceError, match="--follow") as error:
-        index_streams(recording)
-    assert "secret" not in str(error.value)
-    with pytest.raises(RigError, match="one address"):
-        parse_rig(text.replace('kind = "video"', 'kind = "masks"'), path)
+    assert "secret" not in refused(SourceError, "--follow", index_streams, recording)
+    refused(RigError, "one address", parse_rig, text.replace('kind = "video"', 'kind = "masks"'), path)
 
 
 def test_only_passwords_are_hidden() -> None:
@@ -302,10 +264,6 @@ def test_a_broken_video_among_those_that_arrive_is_told(tmp_path: Path) -> None:
     rig = write_pieces(tmp_path, empty=True)
     arrive(tmp_path, 1)
     (tmp_path / "in" / "east_1.avi").write_bytes(b"no video")
-    write_video(tmp_path / "in" / "east_2.avi", numbered(0, 2))
-    with (
-        followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as frame_sets,
-        pytest.raises(SourceError) as error,
-    ):
-        next(frame_sets)
-    assert error.value.place.endswith("east_1.avi")
+    write_at_rate(tmp_path / "in" / "east_2.avi", numbered(0, 2))
+    with followed(rig, tmp_path) as frame_sets:
+        refused(SourceError, r"east_1\.avi: ", next, frame_sets)

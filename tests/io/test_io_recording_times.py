@@ -1,7 +1,5 @@
 """Runs of recordings as they come: other rates, dropped frames, late and early cameras, gaps, files by the piece."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -44,14 +42,10 @@ def jittered(frames: int, share: float) -> Floats:
 
 
 def distances_to_truth(run: Run) -> Floats:
-    """How far every row lies from the nearest walker of its frame, metres."""
+    """How far every row lies from the nearest person of its frame, metres."""
     rows = run.trajectory
-    return np.array(
-        [
-            min(float(np.hypot(x - row["x"], y - row["y"])) for x, y, _ in standing(row["frame"] / FRAME_RATE).tolist())
-            for row in rows
-        ]
-    )
+    people = np.stack([standing(frame / FRAME_RATE) for frame in rows["frame"].tolist()])
+    return np.asarray(np.hypot(people[..., 0].T - rows["x"], people[..., 1].T - rows["y"]).min(axis=0))
 
 
 def presence(run: Run) -> list[tuple[int, int]]:
@@ -89,9 +83,7 @@ def test_other_rates_and_dropped_frames_are_put_right(
     assert messages.startswith("stseg: corner0, corner2: the time stamps vary; each tick shows the nearest frame")
     assert presence(run) == [(0, FRAMES - 1)] * 3
     assert np.median(distances_to_truth(run)) < 1.2 * np.median(distances_to_truth(whole)) + 0.01
-    blind = {
-        name: np.flatnonzero(frame_at_tick < 0).tolist() for name, frame_at_tick in run.provenance.frame_at_tick.items()
-    }
+    blind = {name: np.flatnonzero(ticks < 0).tolist() for name, ticks in run.provenance.frame_at_tick.items()}
     assert blind == {"corner0": lost, "corner1": lost, "corner2": [9, 20, 21, 22, 23, *lost]}
     assert run.frames.tolist() == list(range(FRAMES))
 
@@ -118,8 +110,8 @@ def gaps_of(run: Run) -> list[tuple[int, str]]:
 def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What no camera has for longer than anybody is waited for. Two tell it by stamps, one by its files' starts."""
     seconds = np.delete(regular(90), np.s_[28:64])
-    messages = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))
-    rig = write_films(tmp_path, [Film(seconds), Film(seconds), messages])
+    started = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))
+    rig = write_films(tmp_path, [Film(seconds), Film(seconds), started])
     run = track(rig, *SHORT, workers=2)
     assert "stseg: no camera shows frames 28 to 63: a gap, at which all tracks end\n" in capsys.readouterr().err
     assert run.frames.tolist() == [*range(28), *range(64, 90)]
@@ -132,15 +124,15 @@ def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.Capture
 def test_a_camera_learns_its_background_where_it_sees(tmp_path: Path) -> None:
     """It starts after the part of the recording from which the others learn, and so learns from its own beginning."""
     pictures = [np.full((12, 16, 3), 100 + k % 3, np.uint8) for k in range(60)]
-    write_at_rate(tmp_path / "a.avi", pictures, FRAME_RATE)
+    write_at_rate(tmp_path / "a.avi", pictures)
     eye = Camera("late", (16, 12), np.eye(3), np.array([0.0, 0.0, -1.0]))
     source = CameraSource(Source("video", tmp_path / "a.avi"), None, 40, "blind")
     late = Recording(tmp_path / "rig.toml", Rig("late", FRAME_RATE, Grid((0, 1), (0, 1)), (eye,)), (source,))
     config = Config(segments=SegmentConfig(background_period=2.0))
     for streams in (None, index_streams(late)):
-        (sight,) = make_foregrounds(late, config, 0, 100, streams=streams)
-        assert sight.evidence(None) is None
+        (foreground,) = make_foregrounds(late, config, 0, 100, streams=streams)
+        assert foreground.evidence(None) is None
         (view,) = read_camera(late, 0, [50], streams)
-        likelihood = sight.evidence(view)
+        likelihood = foreground.evidence(view)
         assert isinstance(likelihood, np.ndarray)
         assert likelihood.max() < 0.5

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 
@@ -7,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from strategies import recordings
 
 from stseg.errors import CalibrationError, InputError, OutputError, RigError
@@ -93,15 +92,14 @@ class TestRead:
         assert read_recording(file).rig.name == "room"
 
     def test_missing_file(self, tmp_path: Path) -> None:
-        with pytest.raises(RigError, match=r"nowhere.toml: found No such file or directory, expected a rig file"):
-            read_recording(tmp_path / "nowhere.toml")
+        said = "nowhere.toml: found No such file or directory, expected a rig file"
+        refused(RigError, said, read_recording, tmp_path / "nowhere.toml")
 
     @pytest.mark.parametrize("content", [b"\xff\xfe", b"format = ", b"a = " + b"[" * 5000, b"a = " + b"9" * 5000])
     def test_what_is_no_toml(self, tmp_path: Path, content: bytes) -> None:
         file = tmp_path / "rig.toml"
         file.write_bytes(content)
-        with pytest.raises(RigError, match=r"rig.toml: found .* expected TOML"):
-            read_recording(file)
+        refused(RigError, r"rig.toml: found .* expected TOML", read_recording, file)
 
 
 class TestRefuse:
@@ -147,13 +145,7 @@ class TestRefuse:
             ("vertical = [-320, -240, -1.0]\n", "", ONE + "vertical", "nothing", "3 numbers"),
             ("projection =", "vertical = [0, 0, 1]\nprojection =", TWO + "projection", "beside", "either"),
             ("matrix = [[490.0", "matrix = [[-490.0", ONE + "lens.matrix", "-490.0", "fx, s, cx"),
-            (
-                "distortion = [",
-                "distortion = [1, 2, 3, 4, 5, 6, 7, ",
-                ONE + "lens.distortion",
-                "9",
-                "k1, k2, p1, p2, k3",
-            ),
+            ("distortion = [", f"distortion = [{'1, ' * 7}", ONE + "lens.distortion", "9", "k1, k2, p1, p2, k3"),
             ("offset = -2", 'offset = "-2"', ONE + "offset", "'-2'", "whole number"),
             ('source = { kind = "video", path = "cam1.avi" }\n', "", ONE + "source", "nothing", "a table"),
             ('path = "cam1.avi"', 'file = "cam1.avi"', ONE + "source.file", "unknown key", "path"),
@@ -161,13 +153,7 @@ class TestRefuse:
             ('"cam1.avi"', '"cam1.avi", frames = 3', ONE + "source.frames", "unknown key", "kind, path"),
             ("frames = 263", "frames = 0", TWO + "source.frames", "0", "from 1"),
             ('"blind"', '"blnd"', TWO + "on_missing", "'blnd'", "did you mean blind?"),
-            (
-                'background = { kind = "video"',
-                'background = { kind = "masks"',
-                ONE + "background.kind",
-                "masks",
-                "colour",
-            ),
+            ('d = { kind = "video"', 'd = { kind = "masks"', ONE + "background.kind", "masks", "colour"),
         ],
     )
     def test_names_key_found_and_expected(self, old: str, new: str, key: str, found: str, expected: str) -> None:
@@ -194,16 +180,6 @@ class TestRefuse:
     )
     def test_impossible_geometry_is_placed_in_the_file(self, old: str, new: str, key: str) -> None:
         assert refusal(changed(old, new), CalibrationError).key == key
-
-    @given(st.data())
-    def test_no_slip_of_the_pen_raises_anything_else(self, data: st.DataObject) -> None:
-        start = data.draw(st.integers(0, len(RIG) - 1))
-        stop = data.draw(st.integers(start, min(start + 9, len(RIG))))
-        slip = data.draw(st.text("0123456789.-e[]{}\"'=,#\nnaif ", max_size=4))
-        try:
-            parse_rig(RIG[:start] + slip + RIG[stop:], FILE)
-        except InputError as error:
-            assert "\n" not in str(error)
 
 
 class TestWrite:
@@ -246,10 +222,10 @@ class TestWrite:
         recording = parse_rig(RIG, FILE)
         path = tmp_path / "rig.toml"
         twins = dataclasses.replace(recording.rig, cameras=(recording.rig.cameras[0],) * 2)
-        with pytest.raises(RigError, match=r"rig.toml: camera\[1\].name: found 'cam1'"):
-            write_rig(path, Recording(path, twins, recording.sources))
+        other = Recording(path, twins, recording.sources)
+        refused(RigError, r"rig.toml: camera\[1\].name: found 'cam1'", write_rig, path, other)
         assert not path.exists()
 
     def test_place_that_cannot_be_written(self, tmp_path: Path) -> None:
-        with pytest.raises(OutputError, match=r"nowhere/rig.toml: found no such folder"):
-            write_rig(tmp_path / "nowhere/rig.toml", parse_rig(RIG, FILE))
+        path = tmp_path / "nowhere/rig.toml"
+        refused(OutputError, r"nowhere/rig.toml: found no such folder", write_rig, path, parse_rig(RIG, FILE))

@@ -1,7 +1,5 @@
 """Numbers from text, and tables of positions as CSV."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
+from run_files import table_of
 
 from stseg.errors import FormatError, OutputError
 from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
@@ -24,19 +23,16 @@ def path(tmp_path: Path) -> Path:
 
 def trajectory(rows: list[tuple[float, float]]) -> np.ndarray:
     """One person, one row a frame."""
-    table = np.zeros(len(rows), TRAJECTORY)
-    table["frame"], table["id"] = np.arange(len(rows)), 4
-    table["x"], table["y"] = np.array(rows, float).reshape(-1, 2).T
-    table["xx"], table["xy"], table["yy"] = 0.01, -0.0012345, 0.02
-    table["height"], table["score"], table["views"] = 1.754, np.inf, 3
-    return table
+    x, y = np.array(rows, float).reshape(-1, 2).T
+    covariance, frame = {"xx": 0.01, "xy": -0.0012345, "yy": 0.02}, np.arange(len(rows))
+    return table_of(TRAJECTORY, frame=frame, id=4, x=x, y=y, height=1.754, score=np.inf, views=3, **covariance)
 
 
 METRES = st.floats(-1e4, 1e4)
 
 
 @given(rows=st.lists(st.tuples(METRES, METRES), max_size=5))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_positions_survive_writing_and_reading(
     tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[float, float]]
 ) -> None:

@@ -1,7 +1,5 @@
 """What `--publish` sends arrives at a real MQTT broker, by WebSocket and by HTTP; a missing receiver costs nothing."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import socket
@@ -14,27 +12,35 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from arrivals import meanwhile
 from refusals import Command, refused
+from run_files import table_of
 
 from stseg.arrays import Rows
 from stseg.errors import ConfigError
 from stseg.io.live.publishing import Publisher, receiver_of
 from stseg.records.tables import TRAJECTORY
 
+PERSON = {"id": 3, "x": 1.25, "y": -0.5, "height": 1.7, "score": 4.0}
+EXPECTED = [{"frame": frame, "time": frame / 5, **PERSON} for frame in (7, 8, 9)]
+
 
 def rows_of(*frames: int) -> Rows:
-    """A person in each of some frames."""
-    rows = np.zeros(len(frames), TRAJECTORY)
-    rows["frame"], rows["id"], rows["x"], rows["y"], rows["height"], rows["score"] = frames, 3, 1.25, -0.5, 1.7, 4
-    return rows
+    """The person in each of some frames."""
+    return table_of(TRAJECTORY, frame=frames, **PERSON)
 
 
-EXPECTED = [
-    {"frame": frame, "time": frame / 5, "id": 3, "x": 1.25, "y": -0.5, "height": 1.7, "score": 4.0}
-    for frame in (7, 8, 9)
-]
+def publisher_to(address: str, said: Callable[[str], None] = pytest.fail) -> Publisher:
+    return Publisher(receiver_of(address), 5.0, said)
+
+
+@pytest.fixture
+def free_port() -> int:
+    """A port at which nobody listens."""
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        return int(unused.getsockname()[1])
 
 
 @pytest.fixture(autouse=True)
@@ -71,8 +77,7 @@ def posted() -> Iterator[tuple[str, list[bytes], list[int]]]:
             pass
 
     server = HTTPServer(("127.0.0.1", 0), Handler)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
+    thread = meanwhile(server.serve_forever)
     yield f"http://127.0.0.1:{server.server_port}/tracks", bodies, answers
     server.shutdown()
     thread.join()
@@ -81,7 +86,7 @@ def posted() -> Iterator[tuple[str, list[bytes], list[int]]]:
 
 def test_rows_arrive_by_http(posted: tuple[str, list[bytes], list[int]]) -> None:
     address, bodies, _ = posted
-    with Publisher(receiver_of(address), 5.0, pytest.fail) as publisher:
+    with publisher_to(address) as publisher:
         publisher.append(rows_of(7, 8))
         publisher.append(rows_of())
         publisher.append(rows_of(9))
@@ -93,7 +98,7 @@ def test_a_receiver_that_fails_for_a_while_gets_everything(posted: tuple[str, li
     address, bodies, answers = posted
     answers += [503, 503]
     said: list[str] = []
-    with Publisher(receiver_of(address), 5.0, said.append) as publisher:
+    with publisher_to(address, said.append) as publisher:
         publisher.append(rows_of(7))
         wait_for(lambda: bodies)
         publisher.append(rows_of(8, 9))
@@ -111,25 +116,22 @@ def test_an_answer_that_is_no_http_is_one_line() -> None:
                 connection.recv(65536)
                 connection.sendall(b"what?\r\n")
 
-        thread = threading.Thread(target=answer, daemon=True)
-        thread.start()
-        with Publisher(receiver_of(f"http://127.0.0.1:{server.getsockname()[1]}/"), 5.0, said.append) as publisher:
+        thread = meanwhile(answer)
+        with publisher_to(f"http://127.0.0.1:{server.getsockname()[1]}/", said.append) as publisher:
             publisher.append(rows_of(7))
             wait_for(lambda: said, 5)
         thread.join(10)
     assert said[0].startswith("publishing waits for its receiver (") and "\n" not in said[0]
 
 
-def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch, free_port: int) -> None:
     monkeypatch.setattr("stseg.io.live.publishing._WAITING", 10)
-    with socket.socket() as unused:
-        unused.bind(("127.0.0.1", 0))
-        said: list[str] = []
-        begun = time.monotonic()
-        with Publisher(receiver_of(f"http://127.0.0.1:{unused.getsockname()[1]}/"), 5.0, said.append) as publisher:
-            for frame in range(30):
-                publisher.append(rows_of(frame))
-            assert time.monotonic() - begun < 2
+    said: list[str] = []
+    begun = time.monotonic()
+    with publisher_to(f"http://127.0.0.1:{free_port}/", said.append) as publisher:
+        for frame in range(30):
+            publisher.append(rows_of(frame))
+        assert time.monotonic() - begun < 2
     assert time.monotonic() - begun < 10
     assert said[-1].startswith("30 messages were not published")
 
@@ -154,8 +156,7 @@ def listening_socket(handle: Callable[[Any], None], port: int = 0) -> Iterator[i
     """A WebSocket server that gives each connection to `handle`; its port."""
     serving = pytest.importorskip("websockets.sync.server")
     with serving.serve(handle, "127.0.0.1", port) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
-        thread.start()
+        thread = meanwhile(server.serve_forever)
         yield server.socket.getsockname()[1]
         server.shutdown()
         thread.join()
@@ -173,10 +174,7 @@ def test_rows_arrive_at_a_web_socket_that_answers_a_lot() -> None:
             for _ in range(40):
                 connection.send("thank you")
 
-    with (
-        listening_socket(handle) as port,
-        Publisher(receiver_of(f"ws://127.0.0.1:{port}/hall?live=1"), 5.0, pytest.fail) as publisher,
-    ):
+    with listening_socket(handle) as port, publisher_to(f"ws://127.0.0.1:{port}/hall?live=1") as publisher:
         publisher.append(rows_of(7, 8))
         publisher.append(rows_of(9))
         wait_for(lambda: len(bodies) == 2)
@@ -208,17 +206,14 @@ def test_a_web_socket_that_breaks_is_opened_again() -> None:
     assert messages == ["first", "second"]
 
 
-def test_a_web_socket_that_comes_late_is_one_line_and_another() -> None:
+def test_a_web_socket_that_comes_late_is_one_line_and_another(free_port: int) -> None:
     said: list[str] = []
     bodies: list[bytes] = []
-    with socket.socket() as unused:
-        unused.bind(("127.0.0.1", 0))
-        port = unused.getsockname()[1]
-    with Publisher(receiver_of(f"ws://127.0.0.1:{port}/"), 5.0, said.append) as publisher:
+    with publisher_to(f"ws://127.0.0.1:{free_port}/", said.append) as publisher:
         publisher.append(rows_of(7, 8, 9))
         wait_for(lambda: said)
         time.sleep(0.2)
-        with listening_socket(lambda connection: bodies.extend(text.encode() for text in connection), port):
+        with listening_socket(lambda connection: bodies.extend(text.encode() for text in connection), free_port):
             wait_for(lambda: bodies and len(said) == 2)
     assert said[0].startswith("publishing waits for its receiver (") and "refused" in said[0]
     assert said[1:] == ["publishing goes on"] and parsed(bodies) == EXPECTED
@@ -227,7 +222,7 @@ def test_a_web_socket_that_comes_late_is_one_line_and_another() -> None:
 def test_a_web_server_that_is_none_of_sockets_is_one_line(posted: tuple[str, list[bytes], list[int]]) -> None:
     pytest.importorskip("websockets.sync.client")
     said: list[str] = []
-    with Publisher(receiver_of(posted[0].replace("http", "ws")), 5.0, said.append) as publisher:
+    with publisher_to(posted[0].replace("http", "ws"), said.append) as publisher:
         publisher.append(rows_of(7))
         wait_for(lambda: said)
     assert said == [
@@ -241,24 +236,20 @@ def test_without_its_library_a_web_socket_says_what_to_install(monkeypatch: pyte
     refused(ConfigError, r"pip install 'stseg\[websocket\]'", receiver_of, "ws://127.0.0.1/")
 
 
-def test_rows_arrive_at_a_broker() -> None:
+def test_rows_arrive_at_a_broker(free_port: int) -> None:
     broker = pytest.importorskip("amqtt.broker")
     client = pytest.importorskip("amqtt.client")
     pytest.importorskip("paho.mqtt.client")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
     bodies: list[bytes] = []
     listening = threading.Event()
 
     async def serve() -> None:
         plugins = {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}}
-        own = broker.Broker(
-            {"listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}}, "plugins": plugins}
-        )
+        listeners = {"default": {"type": "tcp", "bind": f"127.0.0.1:{free_port}"}}
+        own = broker.Broker({"listeners": listeners, "plugins": plugins})
         await own.start()
         reader = client.MQTTClient(config={"auto_reconnect": False})
-        await reader.connect(f"mqtt://127.0.0.1:{port}/")
+        await reader.connect(f"mqtt://127.0.0.1:{free_port}/")
         await reader.subscribe([("hall/tracks", 1)])
         listening.set()
         while len(bodies) < 2:
@@ -267,10 +258,9 @@ def test_rows_arrive_at_a_broker() -> None:
         await reader.disconnect()
         await own.shutdown()
 
-    thread = threading.Thread(target=lambda: asyncio.run(serve()), daemon=True)
-    thread.start()
+    thread = meanwhile(lambda: asyncio.run(serve()))
     assert listening.wait(30)
-    with Publisher(receiver_of(f"mqtt://127.0.0.1:{port}/hall/tracks"), 5.0, pytest.fail) as publisher:
+    with publisher_to(f"mqtt://127.0.0.1:{free_port}/hall/tracks") as publisher:
         publisher.append(rows_of(7, 8))
         publisher.append(rows_of(9))
         wait_for(lambda: len(bodies) == 2)

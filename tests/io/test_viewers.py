@@ -1,7 +1,5 @@
 """A run file as other programs see it: HDF5, silx, xarray, PedPy, napari, pandas."""
 
-from __future__ import annotations
-
 import sys
 import tomllib
 import warnings
@@ -91,9 +89,6 @@ def test_xarray_has_named_axes_with_units_and_selects_by_them(run_path: Path) ->
         assert int(place) == label[4, 1, 2, 4] == 2
 
 
-# PedPy
-
-
 def test_pedpy_takes_trajectory_and_area_from_the_run_file(run_path: Path) -> None:
     data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run_path)
     assert data.frame_rate == 5.0
@@ -172,7 +167,9 @@ def test_napari_s_other_files_are_left_to_others(run_path: Path, tmp_path: Path)
 
 
 def test_the_manifest_leads_npe2_to_the_reader(run_path: Path) -> None:
-    npe2: Any = imported_npe2()
+    with warnings.catch_warnings():  # its models warn of pydantic's changes when they are made
+        warnings.simplefilter("ignore")
+        npe2: Any = pytest.importorskip("npe2", reason="npe2 is not installed")
     manifest = npe2.PluginManifest.from_file(ROOT / "stseg" / "napari.yaml")
     manifest.validate_imports()
     manager = npe2.PluginManager(disable=[])
@@ -187,14 +184,6 @@ def test_the_manifest_leads_npe2_to_the_reader(run_path: Path) -> None:
 def test_the_package_says_where_its_manifest_is() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     assert project["project"]["entry-points"]["napari.manifest"] == {"stseg": "stseg:napari.yaml"}
-    assert "napari.yaml" in project["tool"]["setuptools"]["package-data"]["stseg"]
-
-
-def imported_npe2() -> Any:
-    """npe2, whose models warn of pydantic's changes when they are made."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return pytest.importorskip("npe2", reason="npe2 is not installed")
 
 
 @pytest.fixture
@@ -215,17 +204,18 @@ def test_hdf5_unpacks_the_same(label: np.ndarray) -> None:
         assert np.array_equal(dataset[()], label)
 
 
-@pytest.mark.parametrize("wrong", ["more", "fewer", "cut off", "no deflate", "not shuffled"])
-def test_labels_that_were_packed_otherwise_are_refused(label: np.ndarray, wrong: str) -> None:
-    packed = packed_frame(label).data
-    frames = {
-        "more": packed_frame(np.concatenate([label, label])),
-        "fewer": packed_frame(label[:2]),
-        "cut off": PackedFrame(0, packed[:-6]),
-        "no deflate": PackedFrame(0, label.tobytes()),
-        "not shuffled": PackedFrame(1, zlib.compress(label.tobytes())),
-    }
-    refused(ValueError, r".+", unpacked_label, frames[wrong], SHAPE)
+@pytest.mark.parametrize(
+    "otherwise",
+    [
+        pytest.param(lambda label: packed_frame(np.concatenate([label, label])), id="more"),
+        pytest.param(lambda label: packed_frame(label[:2]), id="fewer"),
+        pytest.param(lambda label: PackedFrame(0, packed_frame(label).data[:-6]), id="cut off"),
+        pytest.param(lambda label: PackedFrame(0, label.tobytes()), id="no deflate"),
+        pytest.param(lambda label: PackedFrame(1, zlib.compress(label.tobytes())), id="not shuffled"),
+    ],
+)
+def test_labels_that_were_packed_otherwise_are_refused(label: np.ndarray, otherwise: Any) -> None:
+    refused(ValueError, r".+", unpacked_label, otherwise(label), SHAPE)
 
 
 @pytest.fixture(scope="module")
@@ -244,11 +234,8 @@ def uu4_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_silx_shows_real_cameras(uu4_run: Path) -> None:
     with silx.io.open(str(uu4_run)) as file:
         shown = silx.io.nxdata.get_default(file)
-        assert (shown.is_valid, shown.signal_dataset_name, shown.signal.shape) == (
-            True,
-            "log_odds",
-            (UU4_FRAMES, 10, 60, 50),
-        )
+        assert shown.is_valid and shown.signal_dataset_name == "log_odds"
+        assert shown.signal.shape == (UU4_FRAMES, 10, 60, 50)
         assert [axis.attrs["units"] for axis in shown.axes] == ["s", "m", "m", "m"]
         np.testing.assert_allclose(shown.axes[0][()], np.arange(UU4_FRAMES) / 5)
 

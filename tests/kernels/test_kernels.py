@@ -1,15 +1,13 @@
 """Kernels: compiled with all that they call, kept in the cache, with named tuples passed by address."""
 
-from __future__ import annotations
-
-import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from recordings import ENVIRONMENT
+from recordings import process, started
+from refusals import refused
 
 from stseg.arrays import Floats, Ints
 from stseg.kernels.accelerate import kernel, python_form
@@ -58,19 +56,15 @@ def test_python_and_kernels_call_the_same_kernel() -> None:
     assert sum_of_halves(values, 3) == 3.5
     assert half(values, 2) == 2.0
     for called in (half, sum_of_halves):
-        with pytest.raises(IndexError, match="beyond"):
-            called(values, 4)
+        refused(IndexError, "beyond", called, values, 4)
 
 
 @COMPILED
 def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
     empty, first, second, ahead = (
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)}, capture_output=True, text=True, check=True,
-        ).stdout.splitlines()
+        process(program, NUMBA_CACHE_DIR=str(tmp_path)).stdout.splitlines()
         for program in (AHEAD, PROGRAM, PROGRAM, AHEAD)
-    )  # fmt: skip
+    )
     assert first == ["compiling kernels, once on this machine, about a minute of work", "4.9 1 0", "True"]
     assert second == ["4.9 1 0", "False"]
     assert (empty, ahead) == (["0"], ["1"])
@@ -80,20 +74,11 @@ def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
 @COMPILED
 @pytest.mark.skipif(sys.platform == "win32", reason="no locks of folders")
 def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
-    started = [
-        subprocess.Popen(
-            [sys.executable, "-c", PROGRAM],
-            env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)}, stdout=subprocess.PIPE, text=True,
-        )
-        for _ in range(2)
-    ]  # fmt: skip
-    printed = [process.communicate()[0].splitlines() for process in started]
+    both = [started(PROGRAM, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2)]
+    printed = [running.communicate()[0].splitlines() for running in both]
     assert sorted(len(lines) for lines in printed) == [2, 3]
     assert sum("compiling" in lines[0] for lines in printed) == 1
     assert [lines[-2] for lines in printed] == ["4.9 1 0", "4.9 1 0"]
-
-
-# Tuples by address
 
 
 class Walk(NamedTuple):
