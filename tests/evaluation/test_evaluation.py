@@ -1,10 +1,7 @@
 """Scores against truth: named small scenes, slow twins, motmetrics, and golden values of the reference scorer."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
-import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,9 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 import reference_evaluation as reference
+from cyclopts import App
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recordings import data_path
 from refusals import refused
+from run_files import table_of
 
 from stseg.arrays import Flags, Ints, Rows
 from stseg.commands.evaluate import evaluate as command
@@ -69,9 +69,6 @@ def crowd(seed: int, people: int = 3, frames: int = 6) -> tuple[Rows, Rows]:
         if rng.random() < 0.3:
             tracks.append((frame, 50, *rng.uniform(0, 1.2, 2)))
     return table(truth), table(tracks)
-
-
-# Named scenes
 
 
 def test_perfect_tracks_score_full_marks_whatever_their_names() -> None:
@@ -183,9 +180,7 @@ def test_scores_without_a_denominator_are_none() -> None:
 
 
 def test_a_trajectory_table_is_taken_as_it_is() -> None:
-    trajectory = np.zeros(len(TWO), TRAJECTORY)
-    for name in ("frame", "id", "x", "y"):
-        trajectory[name] = TWO[name]
+    trajectory = table_of(TRAJECTORY, **{name: TWO[name] for name in ("frame", "id", "x", "y")})
     assert evaluate(TWO, trajectory) == evaluate(TWO, TWO)
 
 
@@ -202,11 +197,8 @@ def test_tables_that_cannot_be_are_refused() -> None:
     refused(ConfigError, "area", evaluate, TWO, TWO, area=(1, 0, 0, 1))
 
 
-# Properties and other judges
-
-
 @given(SEEDS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_slow_definitions_agree(seed: int) -> None:
     truth, tracks = crowd(seed)
     scene, scores = reference.scene_of(truth, tracks), evaluate(truth, tracks)
@@ -220,7 +212,7 @@ def test_the_slow_definitions_agree(seed: int) -> None:
 
 
 @given(SEEDS)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_neither_names_nor_the_order_of_rows_matter(seed: int) -> None:
     truth, tracks = crowd(seed)
     rng = np.random.default_rng(seed)
@@ -245,23 +237,17 @@ def test_the_reference_scorer_agrees_figure_by_figure(
 
 def _keywords(options: list[str]) -> dict[str, Any]:
     """Options of the reference scorer as arguments of the command."""
-    words = [word for option in options for word in option.split("=")]
-    flagged = "--ignore-flagged" in words
-    words = [word for word in words if word != "--ignore-flagged"]
-    values: dict[str, Any] = dict(zip([word[2:] for word in words[::2]], words[1::2], strict=True))
-    if "gate" in values:
-        values["gate"] = float(values["gate"])
-    return {**values, "ignore_flagged": flagged}
+    words = [word for option in options for word in option.split("=") if word != "--ignore-flagged"]
+    values = {
+        key[2:]: float(value) if key == "--gate" else value for key, value in zip(words[::2], words[1::2], strict=True)
+    }
+    return {**values, "ignore_flagged": "--ignore-flagged" in options}
 
 
 @pytest.fixture(scope="module")
 def scorer() -> ModuleType:
     """The reference scorer without the two figures that it asks TrackEval for."""
-    shared = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data")).parent
-    path = shared / "tools" / "score.py"
-    if not path.exists():
-        pytest.skip("the reference scorer is not here")
-    spec = importlib.util.spec_from_file_location("reference_scorer", path)
+    spec = importlib.util.spec_from_file_location("reference_scorer", data_path("../tools/score.py"))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -277,14 +263,11 @@ def test_the_reference_scorer_agrees_on_many_crowds_and_on_ties(scorer: ModuleTy
             for axis in ("x", "y"):
                 rows[axis] = rows[axis].round(1)  # many distances tie, many lie on the gate
         area = (0.1, 0.1, 0.9, 1.0) if seed % 2 else None
-        columns = [(rows["frame"], rows["id"], _places(rows), rows["flag"]) for rows in (truth, tracks)]
+        places = [np.column_stack([rows["x"], rows["y"]]) for rows in (truth, tracks)]
+        columns = [(r["frame"], r["id"], xy, r["flag"]) for r, xy in zip((truth, tracks), places, strict=True)]
         theirs = scorer.score(*columns, 0.3, area and list(area), "2:10", seed % 3 == 0)
         ours = evaluate(truth, tracks, 0.3, area, np.arange(2, 10), seed % 3 == 0).as_dict()
         assert {name: ours[name] for name in theirs} == theirs
-
-
-def _places(rows: Rows) -> Any:
-    return np.stack([rows["x"], rows["y"]], -1)
 
 
 def lanes(seed: int) -> tuple[Rows, Rows]:
@@ -318,7 +301,7 @@ def judged_by_motmetrics(truth: Rows, tracks: Rows, gate: float) -> dict[str, fl
 
 @pytest.mark.filterwarnings("ignore")
 @given(SEEDS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_motmetrics_agrees_on_clear(seed: int) -> None:
     truth, tracks = lanes(seed)
     ours, theirs = evaluate(truth, tracks), judged_by_motmetrics(truth, tracks, 0.5)
@@ -329,13 +312,10 @@ def test_motmetrics_agrees_on_clear(seed: int) -> None:
 
 @pytest.mark.filterwarnings("ignore")
 @given(SEEDS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_motmetrics_agrees_on_identity(seed: int) -> None:
     truth, tracks = crowd(seed)
     assert evaluate(truth, tracks).idf1 == pytest.approx(100 * judged_by_motmetrics(truth, tracks, 0.5)["idf1"])
-
-
-# The command
 
 
 @pytest.fixture
@@ -356,8 +336,6 @@ def test_the_table_says_what_it_was_taken_on(files: tuple[Path, Path], capsys: p
 
 
 def test_the_command_line_is_understood(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
-    from cyclopts import App
-
     app = App(result_action="return_value")
     app.command(command)
     for area in (["--area=-1,-1,9,9"], ["--area", "-1,-1,9,9"]):

@@ -1,7 +1,5 @@
 """Pages: links, files, keys, columns, code and sentences."""
 
-from __future__ import annotations
-
 import ast
 import re
 import shlex
@@ -179,10 +177,6 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
     assert f'"$bin/python" {command} |' in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
-# Code
-
-
-CODE_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 _CODE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -220,7 +214,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @compiled_only
-@pytest.mark.parametrize("page", [p for p in CODE_PAGES if blocks(p, "python")], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=lambda page: page.name)
 def test_python_blocks_run(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MPLBACKEND", "agg")
@@ -230,21 +224,12 @@ def test_python_blocks_run(page: Path, folder: Path, monkeypatch: pytest.MonkeyP
             exec(compile(code, f"{page.name}, block {number}", "exec"), names)
 
 
-@pytest.mark.parametrize("page", [p for p in CODE_PAGES if commands(p)], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [p for p in PAGES if commands(p)], ids=lambda page: page.name)
 def test_commands_parse(page: Path) -> None:
     for tokens in commands(page):
         _app(tokens).parse_args(tokens, exit_on_error=False, print_error=False)
 
 
-# Sentences
-
-
-PROSE_PAGES = [
-    ROOT / "README.md",
-    ROOT / "CONTRIBUTING.md",
-    ROOT / "CHANGELOG.md",
-    *sorted((ROOT / "docs").rglob("*.md")),
-]
 SENTENCE_WORDS = 25
 """Greatest number of words of a sentence."""
 _BLOCK = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
@@ -272,6 +257,6 @@ def test_lists_tables_and_headings_end_sentences() -> None:
     assert found == ["One", "Two words, 0.5 m.", "Next:", "code (ends).", "Still", "item", "second", "a", "b c"]
 
 
-@pytest.mark.parametrize("page", PROSE_PAGES, ids=[page.relative_to(ROOT).as_posix() for page in PROSE_PAGES])
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CHANGELOG.md"], ids=[*NAMES, "CHANGELOG.md"])
 def test_sentences_are_short(page: Path) -> None:
     assert [one for one in sentences(page.read_text("utf-8")) if word_count(one) > SENTENCE_WORDS] == []

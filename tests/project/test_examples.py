@@ -1,7 +1,5 @@
 """The example of the documentation, on people who are simulated, beside PedPy."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +8,7 @@ import numpy as np
 import pandas
 import pedpy
 import pytest
-from run_files import small_recording, write_run
+from run_files import small_recording, table_of, write_run
 
 from stseg.geometry import Grid
 from stseg.io.runfile.runs import Run, read_run
@@ -28,9 +26,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Fourteen people who walk about 6 m x 6 m for ten seconds, as a tracker without faults would follow them."""
     folder, spec = tmp_path_factory.mktemp("run"), replace(NAMED["dense"], seconds=10.0)
     truth = np.concatenate([crowd.truth(spec.area) for crowd in walk_freely(spec)])
-    trajectory = np.zeros(len(truth), TRAJECTORY)
-    for name in ("frame", "id", "x", "y", "height"):
-        trajectory[name] = truth[name]
+    trajectory = table_of(TRAJECTORY, **{name: truth[name] for name in ("frame", "id", "x", "y", "height")})
     recording = small_recording(folder)
     rig = replace(recording.rig, frame_rate=spec.frame_rate, grid=Grid((-3, 3), (-3, 3), 1.0, 1.8, 1))
     path, frames = folder / "run.h5", np.arange(spec.frames)
@@ -65,9 +61,8 @@ def test_the_flow_is_pedpy_s(run: Run) -> None:
     table = run.data_frame("trajectory")
     found = flow_and_density.crossings(table, np.array([-3.0, 0.0]), np.array([3.0, 0.0]))
     line = pedpy.MeasurementLine([(-3, 0), (3, 0)])
-    _, crossing = pedpy.compute_n_t(
-        traj_data=pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run.path), measurement_line=line
-    )
+    data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run.path)
+    _, crossing = pedpy.compute_n_t(traj_data=data, measurement_line=line)
     first = (found.groupby("id")["time"].min() * run.frame_rate).round().astype(int)  # PedPy counts who crosses once
     first = first[first < run.frames[-1]]  # and not in the last frame
     assert first.to_dict() == dict(zip(crossing["id"], crossing["frame"], strict=True))

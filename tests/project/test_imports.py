@@ -1,7 +1,5 @@
 """Who may import whom, read from the sources."""
 
-from __future__ import annotations
-
 import ast
 import sys
 import tomllib
@@ -111,32 +109,26 @@ def parts_imported(module: Module) -> set[str]:
     return taken - {module.part}
 
 
-def allowed(part: str) -> set[str]:
-    """What the modules of a part may import."""
-    if part == "__init__":  # the public names, for type checkers; at run time each is imported when it is asked for
-        return {*FOUNDATION, *STAGES, *BESIDE, "engine", "tasks"}
-    if part == "__main__":
-        return {"commands"}
-    if part in FOUNDATION:
-        return set(FOUNDATION[: FOUNDATION.index(part)])
-    if part == SOLVER:
-        return {"errors", "arrays", "kernels"}
-    if part in STAGES:
-        return {*FOUNDATION, *STAGES[part]}
-    if part in ("trackers", "baselines"):
-        return {*FOUNDATION, *BESIDE[part]}
-    if part == "engine":
-        return {*FOUNDATION, *STAGES, "trackers", "io"}
-    if part == "tasks":
-        return {*FOUNDATION, *STAGES, *BESIDE, "engine"} - {"baselines"}
-    if part == "commands":
-        return {*FOUNDATION, *STAGES, *BESIDE, "engine", "tasks"} - {"baselines"}
-    return BESIDE[part]
+ALLOWED = {
+    # the public names, for type checkers; at run time each is imported when it is asked for
+    "__init__": {*FOUNDATION, *STAGES, *BESIDE, "engine", "tasks"},
+    "__main__": {"commands"},
+    **{part: set(FOUNDATION[:k]) for k, part in enumerate(FOUNDATION)},
+    SOLVER: {"errors", "arrays", "kernels"},
+    **{stage: {*FOUNDATION, *parts} for stage, parts in STAGES.items()},
+    **BESIDE,
+    "trackers": {*FOUNDATION, *BESIDE["trackers"]},
+    "baselines": {*FOUNDATION, *BESIDE["baselines"]},
+    "engine": {*FOUNDATION, *STAGES, "trackers", "io"},
+    "tasks": {*FOUNDATION, *STAGES, *BESIDE, "engine"} - {"baselines"},
+    "commands": {*FOUNDATION, *STAGES, *BESIDE, "engine", "tasks"} - {"baselines"},
+}
+"""What the modules of a part may import."""
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
 def test_a_module_imports_what_stands_below_it(module: Module) -> None:
-    assert parts_imported(module) <= allowed(module.part)
+    assert parts_imported(module) <= ALLOWED[module.part]
 
 
 @pytest.mark.parametrize("library", AT_HOME)
@@ -173,10 +165,9 @@ def test_io_is_a_linked_folder_without_init() -> None:
 
 def test_pyproject_lists_every_package() -> None:
     listed = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["packages"]
-    folders = {path.parent for path in (ROOT / "stseg").rglob("*.py")} | {
-        ROOT / "stseg" / path.parent.relative_to(ROOT) for path in (ROOT / "io").rglob("*.py")
-    }
-    assert sorted(listed) == sorted(".".join(folder.relative_to(ROOT).parts) for folder in folders)
+    folders = {path.relative_to(ROOT).parts[:-1] for path in (ROOT / "stseg").rglob("*.py")}
+    folders |= {("stseg", *path.relative_to(ROOT).parts[:-1]) for path in (ROOT / "io").rglob("*.py")}
+    assert sorted(listed) == sorted(map(".".join, folders))
 
 
 def test_a_run_imports_no_library_that_it_does_not_use() -> None:

@@ -1,7 +1,5 @@
 """Packages hold what they need, and the wheel runs."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -64,9 +62,6 @@ def test_ci_names_rooms_and_tools_that_exist() -> None:
     paths = expanded.stdout.split()
     assert len(paths) > 10
     assert [path for path in paths if not (ROOT / path).exists()] == []
-
-
-# The wheel
 
 
 _BUILD = "import sys; from setuptools.build_meta import build_wheel; build_wheel(sys.argv[1])"

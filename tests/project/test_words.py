@@ -1,7 +1,5 @@
 """Names and docstrings are nouns of the field: no bare adjective names a constant, no participle a variable."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,14 +1,12 @@
 """Charts, statistics and maps of a run agree with its tables."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from run_files import trajectory_of
+from run_files import table_of, trajectory_of
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
@@ -42,8 +40,7 @@ def test_the_chart_counts_people() -> None:
 
 
 def test_the_chart_of_a_long_recording_stays_small() -> None:
-    table = np.zeros(20000, TRAJECTORY)
-    table["frame"] = np.arange(20000)
+    table = table_of(TRAJECTORY, frame=np.arange(20000))
     assert len(steps(people_chart(Span(0, 20000, 25.0), table, None), "line")) <= 900
 
 
@@ -53,12 +50,11 @@ def test_sparse_truth_holds_until_the_next_frame_that_it_knows() -> None:
     assert heights[0] == heights[1] == heights[2] > heights[3] == heights[4] == heights[5]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(st.integers(0, 900), st.integers(0, 90)), max_size=40))
 def test_bars_of_tracks_never_overlap(spans: list[tuple[int, int]]) -> None:
-    tracks = np.zeros(len(spans), TRACK)
-    for k, (first, length) in enumerate(spans):
-        tracks["id"][k], tracks["first"][k], tracks["last"][k] = k + 1, first, first + length
+    first, length = np.reshape(spans, (-1, 2)).T
+    tracks = table_of(TRACK, id=np.arange(len(spans)) + 1, first=first, last=first + length)
     svg = track_chart(Span(0, 1000, 5.0), tracks, [])
     bars = [tuple(map(float, bar)) for bar in re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)"', svg)]
     assert len(bars) == len(spans)
@@ -74,8 +70,7 @@ def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
     found = doubtful_stretches(rows[::-1])
     assert [(one.track, one.first, one.last) for one in found] == [(1, 3, 4), (1, 7, 7), (2, 2, 2), (2, 30, 30)]
     assert [one.certainty for one in found] == pytest.approx([0.5] * 4)
-    tracks = np.zeros(3, TRACK)
-    tracks["id"], tracks["last"] = (1, 2, 3), (9, 30, 5)
+    tracks = table_of(TRACK, id=(1, 2, 3), last=(9, 30, 5))
     np.testing.assert_allclose(mean_certainty(rows, tracks), [0.85, 1 - 1 / 11, np.nan], atol=1e-3)
     svg = track_chart(Span(0, 40, 5.0), tracks, found)
     assert svg.count('class="pale"') == 4
@@ -86,15 +81,9 @@ def test_clock_times() -> None:
     assert [clock_time(second) for second in (0, 12.4, 75, 7385)] == ["0 s", "12.4 s", "1:15", "2:03:05"]
 
 
-# Statistics
-
-
 def stays(*tracks: tuple[int, int]) -> Rows:
     """A track from each first frame to its stop."""
-    rows = np.zeros(sum(stop - first for first, stop in tracks), TRAJECTORY)
-    rows["id"] = np.repeat(np.arange(1, len(tracks) + 1), [stop - first for first, stop in tracks])
-    rows["frame"] = np.concatenate([np.arange(*one) for one in tracks])
-    return rows
+    return trajectory_of(*((frame, k, 0, 0) for k, own in enumerate(tracks, 1) for frame in range(*own)))
 
 
 def test_people_by_the_hour() -> None:
@@ -114,17 +103,15 @@ def test_the_busiest_minutes_are_in_order_of_time() -> None:
 
 def test_each_minute_has_its_own_mean() -> None:
     frames = np.arange(30, 30 + 90)  # a minute and a half, one frame a second
-    rows = np.zeros(60 + 90, TRAJECTORY)
-    rows["frame"] = np.concatenate([np.arange(30, 90), frames])
+    rows = table_of(TRAJECTORY, frame=np.concatenate([np.arange(30, 90), frames]))
     np.testing.assert_allclose(people_per_minute(frames, rows, 1.0), [2, 1])
     assert people_per_minute(frames[:0], rows[:0], 1.0).shape == (0,)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.integers(0, 199), max_size=60), st.floats(0.2, 3))
 def test_minutes_add_up_to_all_people(drawn: list[int], frame_rate: float) -> None:
-    frames, rows = np.arange(200), np.zeros(len(drawn), TRAJECTORY)
-    rows["frame"] = drawn
+    frames, rows = np.arange(200), table_of(TRAJECTORY, frame=drawn)
     length = max(1, round(60 * frame_rate))
     minutes = people_per_minute(frames, rows, frame_rate)
     lengths = np.diff([*range(0, 200, length), 200])
@@ -137,9 +124,6 @@ def test_shares_of_the_ground_that_counts() -> None:
     views[0, 1, 0] = 1
     inside = np.array([[True, True, False], [True, True, False]])
     np.testing.assert_allclose(ground_by_views(views, inside, 2), [0.25, 0.25, 0.5])
-
-
-# Maps
 
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
@@ -164,7 +148,7 @@ def test_a_return_begins_another_stay() -> None:
     assert not dwell(BINS, trajectory_of(), 2.0).any()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-1, 5), st.floats(-2, 3)), max_size=50))
 def test_every_row_on_the_ground_is_counted_once(places: list[tuple[float, float]]) -> None:
     rows = trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(places)))
@@ -184,9 +168,8 @@ def test_haunts_are_where_most_time_is_spent() -> None:
     talking = rng.normal((3.0, 1.0), 0.1, (100, 2))
     passing = rng.uniform((0, -1), (4, 2), (20, 2))
     places = np.concatenate([waiting, talking, passing])
-    found = dwell_places(
-        trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(places.tolist()))), Bins(BINS.x, BINS.y, 0.25)
-    )
+    rows = trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(places.tolist())))
+    found = dwell_places(rows, Bins(BINS.x, BINS.y, 0.25))
     assert len(found) == 2
     np.testing.assert_allclose([(place.x, place.y) for place in found], [(1, 0), (3, 1)], atol=0.15)
     np.testing.assert_allclose([place.share for place in found], [300 / 420, 100 / 420], atol=0.04)

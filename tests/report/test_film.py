@@ -1,15 +1,15 @@
 """The film of a run: as many frames as asked, pillars where people are, camera pixels only when asked for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
 import pytest
 import run_files
-from refusals import Command
+from refusals import Command, refused
+from scenes import looking
 
 from stseg.arrays import Bytes, Rows
 from stseg.commands.main import main
@@ -23,13 +23,11 @@ from stseg.reporting.pictures.colours import track_colour
 from stseg.reporting.pictures.overlay import OverlayView
 
 VIVID = (20, 240, 160)
-_TURN = np.array([[1, 0, 0], [0, -np.sin(0.4), -np.cos(0.4)], [0, np.cos(0.4), -np.sin(0.4)]])
-_LENS = np.array([[250.0, 0, 159.5], [0, 250.0, 119.5], [0, 0, 1]])
 
 
 def front_camera(name: str, x: float) -> Camera:
     """Three metres above y = -4, looking along y and down."""
-    return Camera.from_projection(name, (320, 240), _LENS @ np.column_stack([_TURN, -_TURN @ (x, -4.0, 3.0)]))
+    return looking(name, (x, -4.0, 3.0), (x, -4.0 + 3.0 / np.tan(0.4), 0.0), (320, 240), 250.0)
 
 
 @pytest.fixture
@@ -45,10 +43,7 @@ def recording(tmp_path: Path) -> Recording:
 
 def walk() -> Rows:
     """One person who crosses the ground in frames 10 to 15."""
-    table = np.zeros(6, TRAJECTORY)
-    table["frame"], table["id"], table["height"] = run_files.FRAMES, 1, 1.7
-    table["x"], table["y"] = np.linspace(1.4, 2.6, 6), 0.5
-    return table
+    return run_files.table_of(TRAJECTORY, frame=run_files.FRAMES, id=1, x=np.linspace(1.4, 2.6, 6), y=0.5, height=1.7)
 
 
 @pytest.fixture
@@ -58,12 +53,7 @@ def run_path(recording: Recording, tmp_path: Path) -> Path:
 
 def frames_of(path: Path) -> list[Bytes]:
     film = cv2.VideoCapture(str(path))
-    frames: list[Bytes] = []
-    while True:
-        found, frame = film.read()
-        if not found:
-            return frames
-        frames.append(np.asarray(frame, np.uint8))
+    return [np.asarray(frame, np.uint8) for _, frame in iter(film.read, (False, None))]
 
 
 def is_close(pixel: Bytes, colour: tuple[int, int, int], tolerance: float) -> bool:
@@ -137,13 +127,9 @@ def test_an_older_film_is_kept_unless_it_may_go(run_path: Path, tmp_path: Path) 
 
 
 def test_what_goes_wrong_on_the_way_leaves_no_film(tmp_path: Path) -> None:
-    def broken() -> list[Bytes]:
-        raise OutputError("x", "", "trouble", "none")
-
-    with pytest.raises(OutputError):
-        write_film(tmp_path / "a.mp4", (picture for k in range(1) for picture in broken()), 5.0, False)
-    with pytest.raises(OutputError, match="empty"):
-        write_film(tmp_path / "a.mp4", [], 5.0, False)
+    broken = Mock(side_effect=OutputError("x", "", "trouble", "none"))
+    refused(OutputError, "trouble", write_film, tmp_path / "a.mp4", (broken(k) for k in range(1)), 5.0, False)
+    refused(OutputError, "empty", write_film, tmp_path / "a.mp4", [], 5.0, False)
     assert not list(tmp_path.iterdir())
 
 

@@ -1,7 +1,5 @@
 """The page of a run: its data and its answers."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re
@@ -41,9 +39,6 @@ def decoded(png: bytes) -> Bytes:
     return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED), np.uint8)
 
 
-# Sheets
-
-
 def test_a_sheet_gives_the_log_odds_back() -> None:
     sheets = thin_sheets(np.arange(3, 7), GRID, volume_of, 10**6, NO_FRAMES)
     assert sheets.frames.tolist() == [3, 4, 5, 6] and sheets.shape == GRID.shape
@@ -76,7 +71,7 @@ def test_large_ground_is_shown_by_the_greatest_of_some_cells() -> None:
     np.testing.assert_array_equal(coarse(log_odds, 1), log_odds)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(1, 60), st.integers(2, 20))
 def test_spread_frames_reach_from_end_to_end(count: int, most: int) -> None:
     frames = np.arange(10, 10 + count)
@@ -85,17 +80,11 @@ def test_spread_frames_reach_from_end_to_end(count: int, most: int) -> None:
     assert chosen[0] == frames[0] and chosen[-1] == frames[-1]
 
 
-# Tracks and candidates
-
-
 def walks(frames: int, people: int) -> Rows:
     """People on circles of their own, sorted by frame."""
-    table = np.zeros(frames * people, TRAJECTORY)
-    frame, person = np.divmod(np.arange(len(table)), people)
-    turn = frame / 50 + person
-    table["frame"], table["id"], table["height"], table["score"] = frame, person + 1, 1.7, 3
-    table["x"], table["y"] = 2 + np.cos(turn), 0.5 + 0.5 * np.sin(turn)
-    return table
+    frame, person = np.divmod(np.arange(frames * people), people)
+    x, y = 2 + np.cos(frame / 50 + person), 0.5 + 0.5 * np.sin(frame / 50 + person)
+    return run_files.table_of(TRAJECTORY, frame=frame, id=person + 1, height=1.7, score=3, x=x, y=y)
 
 
 def test_thin_tracks_keep_ends_and_moments() -> None:
@@ -141,9 +130,6 @@ def test_candidates_say_why_they_were_dropped(tmp_path: Path) -> None:
     assert data["candidates"] == [[[0, 0, 0, -1, [2, 0]], [0, 0, 0, 0, [-1, 0]]], []]
 
 
-# An hour
-
-
 @pytest.fixture(scope="module")
 def hour(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """54,000 frames of few cells; five people at a time, each for 500 frames, and five ghosts."""
@@ -153,13 +139,11 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table = walks(count, 5)
     table["id"] += 5 * (table["frame"] // 500)
     table["x"], table["y"] = 0.15 * table["x"], 0.2 + 0.1 * table["y"]
-    ghosts = np.zeros(count * 10, ghost_type(2))
-    ghosts["frame"], ghosts["status"] = np.arange(len(ghosts)) // 10, np.arange(len(ghosts)) % 2
-    ghosts["x"], ghosts["y"] = np.random.default_rng(0).uniform(0, 0.4, (2, len(ghosts)))
+    number, (x, y) = np.arange(count * 10), np.random.default_rng(0).uniform(0, 0.4, (2, count * 10))
+    ghosts = run_files.table_of(ghost_type(2), frame=number // 10, status=number % 2, x=x, y=y)
     ghosts["parts"] = np.where(ghosts["status"] == 1, 3, -2)[:, None]
     ghosts["evidence"] = 2 * ghosts["parts"][:, 0] - 3
-    events = np.zeros(5000, EVENT)
-    events["kind"], events["reason"], events["frame"] = b"merge", b"their cells touch", np.arange(5000)
+    events = run_files.table_of(EVENT, kind=b"merge", reason=b"their cells touch", frame=np.arange(5000))
     with RunWriter(path, recording, np.ones((3, 4, 6), np.uint8), run_files.CONFIG, overwrite=False) as writer:
         for first in range(0, count, len(volume)):
             writer.append_frames(np.arange(first, first + len(volume)), volume, label)
@@ -176,17 +160,13 @@ def test_the_page_of_an_hour_stays_below_30_megabytes(hour: Path, tmp_path: Path
     assert 10**6 < (tmp_path / "hour.html").stat().st_size < 30 * 10**6
 
 
-# Answers
-
-
 PLACES = [DwellPlace(1.0, 2.0, 0.4), DwellPlace(-1.0, 0.0, 0.2)]
 
 
 def answers_of(places: list[DwellPlace], shares: list[float], dropped: int = 0) -> list[str]:
     """The four answers of the small run, without their tags."""
     trajectory, candidates = run_files.small_trajectory(), run_files.small_ghosts()
-    events = np.zeros(dropped, EVENT)
-    events["kind"] = b"dropped"
+    events = run_files.table_of(EVENT, kind=np.repeat(b"dropped", dropped))
     found = answers(
         Span(10, 16, 5.0), 6, trajectory, Tracks(trajectory).summary(), events, len(candidates),
         ghost_reasons(candidates), places, np.array(shares),
@@ -198,9 +178,7 @@ def answers_of(places: list[DwellPlace], shares: list[float], dropped: int = 0) 
 
 
 def test_the_four_questions_are_answered() -> None:
-    people, places, ghosts, blind = answers_of(
-        [DwellPlace(1.0, 2.0, 0.4), DwellPlace(-1.0, 0.0, 0.2)], [0.1, 0.25, 0.65], 2
-    )
+    people, places, ghosts, blind = answers_of(PLACES, [0.1, 0.25, 0.65], 2)
     assert people.startswith("1.5 at a time on average, at most 2. There are 2 tracks, half of them 0.9 s or longer")
     assert "A at (1.0, 2.0), 40 %; B at (-1.0, 0.0), 20 %" in places
     assert ghosts.startswith("1 of 3 candidates (0.2 a frame): 100 % because a view sees nobody there.")

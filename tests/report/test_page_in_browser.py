@@ -1,7 +1,5 @@
 """The report in a real browser: no complaint, no request to anywhere, and the slider moves the pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
@@ -13,7 +11,6 @@ from browser import CHROMIUM, Page, chromium
 
 from stseg.commands.report import report
 from stseg.io.areas import read_lines, read_polygons
-from stseg.records.tables import TRAJECTORY
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
 
@@ -35,15 +32,15 @@ def page(folder: Path) -> Iterator[Page]:
 
 
 def pictures(page: Page) -> list[str]:
-    """Pictures of the canvases, once the slice of the moment has been drawn."""
+    """Pictures of the canvases, once the slice of the frame has been drawn."""
     frame = page.ask("/frame (\\d+)/.exec(document.getElementById('clock').textContent)[1]")
     page.wait_for(f"document.getElementById('slice').dataset.frame === '{frame}'")
     return [page.ask(f"document.getElementById('{name}').toDataURL()") for name in CANVASES]
 
 
-def slide(page: Page, moment: int) -> None:
+def slide(page: Page, index: int) -> None:
     """Move the slider as a hand would."""
-    page.ask(f"slider.value = '{moment}'; slider.dispatchEvent(new Event('input')); 0")
+    page.ask(f"slider.value = '{index}'; slider.dispatchEvent(new Event('input')); 0")
 
 
 def test_it_loads_without_a_complaint_or_a_request(page: Page) -> None:
@@ -75,14 +72,14 @@ def test_the_slider_moves_every_picture(page: Page) -> None:
     assert pictures(page) == early
 
 
-def test_candidates_of_the_moment_are_listed_with_their_reason(page: Page) -> None:
+def test_candidates_of_the_frame_are_listed_with_their_reason(page: Page) -> None:
     slide(page, 0)
     rows = page.ask("[...document.getElementById('weighed').rows].map((row) => row.innerText)")
     assert len(rows) == 2
     assert any("ghost a" in row and "no -1.0" in row and "a view sees nobody there" in row for row in rows)
 
 
-def test_the_address_chooses_the_moment_and_the_menu_the_plane(page: Page) -> None:
+def test_the_address_chooses_the_frame_and_the_menu_the_plane(page: Page) -> None:
     page.ask("location.hash = 'frame=13'; 0")
     page.wait_for("document.getElementById('clock').textContent.includes('frame 13')")
     greatest = pictures(page)[1]
@@ -108,9 +105,7 @@ def test_play_goes_on_to_the_end_and_stops(page: Page) -> None:
 
 
 def test_a_run_without_frames_has_a_page_that_does_not_complain(tmp_path: Path) -> None:
-    recording, no_frames = run_files.small_recording(tmp_path), np.zeros(0, np.int64)
-    path = run_files.write_run(tmp_path / "empty.h5", recording, np.zeros(0, TRAJECTORY), no_frames)
-    report(path, output=tmp_path / "empty.html")
+    report(run_files.write_empty_run(tmp_path / "empty.h5"), output=tmp_path / "empty.html")
     with chromium(tmp_path / "profile") as browser:
         browser.open(tmp_path / "empty.html")
         assert browser.complaints == []
@@ -126,9 +121,8 @@ def test_zones_and_lines_are_drawn_on_the_plan_and_saved(page: Page, tmp_path: P
     corners = "[[0.3, 0.3], [0.7, 0.3], [0.7, 0.7], [0.3, 0.7]]"
     page.ask("document.getElementById('area-name').value = 'door <a>'; document.getElementById('draw-zone').click(); 0")
     page.ask(f"{corners}.forEach((place) => ({click})(...place)); {press}; 0")
-    page.ask(
-        f"document.getElementById('draw-line').click(); [[0.2, 0.5], [0.8, 0.5]].forEach((p) => ({click})(...p)); 0"
-    )
+    ends = "[[0.2, 0.5], [0.8, 0.5]]"
+    page.ask(f"document.getElementById('draw-line').click(); {ends}.forEach((p) => ({click})(...p)); 0")
     page.ask(f"{press}; document.getElementById('draw-zone').click(); ({click})(0.5, 0.5); {press}; 0")
     assert [old == new for old, new in zip(before, pictures(page), strict=True)] == [False, True, True]
     href = page.ask("document.getElementById('save-areas').href")

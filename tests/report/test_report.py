@@ -1,11 +1,10 @@
 """The report of a run and its warnings."""
 
-from __future__ import annotations
-
 import base64
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import h5py
@@ -28,6 +27,12 @@ from stseg.tasks.report import write_pictures
 from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 
+def page_of(run: Path, output: Path, **options: Any) -> str:
+    """The page that a report writes."""
+    report(run, output=output, **options)
+    return output.read_text("utf-8")
+
+
 def has(picture: Bytes, colour: tuple[int, int, int]) -> bool:
     return bool((picture == colour).all(axis=-1).any())
 
@@ -42,9 +47,7 @@ def decoded(png: bytes) -> Bytes:
 
 
 def test_the_page_holds_everything_and_loads_nothing(run_path: Path, tmp_path: Path) -> None:
-    output = tmp_path / "page.html"
-    report(run_path, output=output)
-    page = output.read_text()
+    page = page_of(run_path, tmp_path / "page.html")
     words = re.sub(r"data:image/png;base64,[^\"]+", "", page)
     assert not re.search(r"https?:|<link|url\(|src=\"[^\"]|<script[^>]* src|fetch\(|import\(|XMLHttpRequest", words)
     assert "default-src 'none'" in page
@@ -60,18 +63,15 @@ def test_an_encounter_is_one_line_and_says_how_long_it_was(tmp_path: Path) -> No
         run_files.fill(writer)
         writer.append("events", np.array(events, EVENT))
         writer.finish(Tracks(run_files.small_trajectory()).summary())
-    report(path, output=tmp_path / "met.html", frame=(11,))
-    page = (tmp_path / "met.html").read_text()
+    page = page_of(path, tmp_path / "met.html", frame=(11,))
     assert "encounter <b>1</b>" in page and "their cells touch, for 0.4 s" in page
     assert "split" not in page.split("<h2>Events</h2>")[1].split("</section>")[0]
     assert "which this run did not keep (--volume tracks)" in page
 
 
 def test_the_same_run_gives_the_same_page(run_path: Path, tmp_path: Path) -> None:
-    pages = [tmp_path / "a.html", tmp_path / "b.html"]
-    for page in pages:
-        report(run_path, output=page, frame=(12,))
-    assert pages[0].read_bytes() == pages[1].read_bytes()
+    one, other = (page_of(run_path, tmp_path / name, frame=(12,)) for name in ("a.html", "b.html"))
+    assert one == other
 
 
 HOSTILE = "<img src=x onerror=alert(1)>'\"&amp;"
@@ -84,18 +84,15 @@ def test_names_from_the_run_cannot_write_html(tmp_path: Path) -> None:
     path, names = tmp_path / "evil.h5", tmp_path / "names.csv"
     run_files.write_small_run(path, recording=evil)
     names.write_text("id,name\n1,</script><script>alert(1)</script>\n2,</td><img src=x onerror=alert(1)>\n")
-    report(path, output=tmp_path / "evil.html", names=names)
-    page = (tmp_path / "evil.html").read_text()
+    page = page_of(path, tmp_path / "evil.html", names=names)
     assert page.count("<script") == 2, "the page's data and its own script"
     assert "<img src=x" not in page and "alert(1)</script>" not in page
     assert "&lt;img src=x onerror=alert(1)&gt;" in page and "&lt;script&gt;alert" in page
 
 
 def test_a_run_without_frames_has_a_page(tmp_path: Path) -> None:
-    recording, no_frames = run_files.small_recording(tmp_path), np.zeros(0, np.int64)
-    path = run_files.write_run(tmp_path / "empty.h5", recording, np.zeros(0, TRAJECTORY), no_frames)
-    report(path, output=tmp_path / "empty.html")
-    assert "<title>hall</title>" in (tmp_path / "empty.html").read_text()
+    path = run_files.write_empty_run(tmp_path / "empty.h5")
+    assert "<title>hall</title>" in page_of(path, tmp_path / "empty.html")
 
 
 @pytest.mark.parametrize("name", ["</script><script>alert(1)", "a\nb", ""])
@@ -126,9 +123,8 @@ def test_camera_pixels_are_shown_only_when_asked_for(filmed_run: Path, tmp_path:
     darkened = (17, 204, 136)  # a little darker
     found = []
     for flag in (False, True):
-        output, folder = tmp_path / f"{flag}.html", tmp_path / f"pictures_{flag}"
-        report(filmed_run, output=output, frame=(11,), camera_images=flag, pictures=folder)
-        page = output.read_text()
+        options, folder = {"frame": (11,), "camera_images": flag}, tmp_path / f"pictures_{flag}"
+        page = page_of(filmed_run, tmp_path / f"{flag}.html", pictures=folder, **options)
         files = [decoded(path.read_bytes()) for path in sorted(folder.glob("*.png"))]
         found.append([any(has(picture, darkened) for picture in pictures) for pictures in (pictures_in(page), files)])
         assert ("shows images from the cameras" in page) is flag
@@ -138,8 +134,7 @@ def test_camera_pixels_are_shown_only_when_asked_for(filmed_run: Path, tmp_path:
 def test_without_the_flag_no_stream_is_even_opened(run_path: Path, tmp_path: Path) -> None:
     run_path.with_name("left.avi").unlink()
     report(run_path, output=tmp_path / "a.html", frame=(11,))
-    with pytest.raises(SourceError):
-        report(run_path, output=tmp_path / "b.html", camera_images=True)
+    refused(SourceError, "left", report, run_path, output=tmp_path / "b.html", camera_images=True)
     assert not (tmp_path / "b.html").exists()
 
 
@@ -160,8 +155,8 @@ def test_truth_adds_scores_of_the_run_s_frames(run_path: Path, tmp_path: Path) -
     rows = [f"{row['frame']},{row['id']},{row['x']},{row['y']}" for row in run_files.small_trajectory()]
     truth = tmp_path / "truth.csv"
     truth.write_text("\n".join(["frame,id,x,y", "3,1,0.1,0.1", *rows, "900,1,0.1,0.1"]))
-    report(run_path, output=tmp_path / "a.html", truth=truth, frame=(11,))
-    assert "<dt>IDF1</dt><dd>100.0 %</dd>" in (tmp_path / "a.html").read_text()
+    page = page_of(run_path, tmp_path / "a.html", truth=truth, frame=(11,))
+    assert "<dt>IDF1</dt><dd>100.0 %</dd>" in page
 
 
 def test_write_pictures_replaces_older_ones(run_path: Path, tmp_path: Path) -> None:
@@ -176,13 +171,8 @@ def test_errors_of_the_user_are_reported(run_path: Path, tmp_path: Path) -> None
     refused(ConfigError, r"--frame.*found 99.*10 to 15", report, run_path, output=tmp_path / "a.html", frame=(99,))
     (tmp_path / "old.html").write_text("old")
     refused(OutputError, "overwrite", report, run_path, output=tmp_path / "old.html")
-    report(run_path, output=tmp_path / "old.html", overwrite=True, frame=(11,))
-    assert (tmp_path / "old.html").read_text() != "old"
-    with pytest.raises(OutputError):
-        report(run_path, output=tmp_path / "a.html", pictures=run_path, frame=(11,))
-
-
-# Warnings
+    assert page_of(run_path, tmp_path / "old.html", overwrite=True, frame=(11,)) != "old"
+    refused(OutputError, "found", report, run_path, output=tmp_path / "a.html", pictures=run_path, frame=(11,))
 
 
 FRAMES = np.arange(100, 400)
@@ -191,9 +181,9 @@ FRAMES = np.arange(100, 400)
 def candidates_of(frame: ArrayLike, status: ArrayLike, parts: ArrayLike, evidence: ArrayLike | None = None) -> Rows:
     """Candidates with the given evidence, or the sum of their parts less a price of 3 nats."""
     parts = np.asarray(parts, np.float32)
-    table = np.zeros(len(parts), ghost_type(parts.shape[1]))
-    table["frame"], table["status"], table["parts"] = frame, status, parts
-    table["evidence"] = parts.sum(axis=1) - 3 if evidence is None else evidence
+    weight = parts.sum(axis=1) - 3 if evidence is None else evidence
+    table = run_files.table_of(ghost_type(parts.shape[1]), frame=frame, status=status, evidence=weight)
+    table["parts"] = parts
     return table
 
 
@@ -201,9 +191,6 @@ def people_in(frames: AnyArray, *parts: ArrayLike) -> Rows:
     """A person in each frame, with this evidence in each view, nats."""
     evidence = np.stack([np.broadcast_to(np.asarray(part, float), len(frames)) for part in parts], -1)
     return candidates_of(frames, np.ones(len(frames)), evidence)
-
-
-# Ghosts
 
 
 def test_ghosts_have_the_reason_that_weighed_most() -> None:
@@ -225,9 +212,6 @@ def test_no_candidates_have_no_reasons() -> None:
     found = ghost_reasons(candidates_of([], [], np.zeros((0, 3))))
     assert found.counts() == [0, 0, 0]
     assert found.denies.shape == (0, 3)
-
-
-# Views
 
 
 def test_views_that_agree_cause_no_warning() -> None:
@@ -259,19 +243,12 @@ def test_little_evidence_of_the_occluded_denies_none() -> None:
     assert view_warnings(("a", "b"), people_in(FRAMES, 3.0, hidden), FRAMES, 5.0) == []
 
 
-# Bodies
-
-
 def bodies_of(height: float, width: float, number: int = 40) -> Rows:
-    rows = np.zeros(number, TRAJECTORY)
-    rows["height"], rows["width"] = height, width
-    return rows
+    return run_files.table_of(TRAJECTORY, height=np.full(number, height), width=width)
 
 
 def rates_of(*miss: float) -> Rows:
-    rows = np.zeros(len(miss), RATES)
-    rows["view"], rows["miss"] = np.arange(len(miss)), miss
-    return rows
+    return run_files.table_of(RATES, view=np.arange(len(miss)), miss=miss)
 
 
 def test_wide_bodies_are_reported_with_the_expected_width() -> None:

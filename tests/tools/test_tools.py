@@ -1,16 +1,13 @@
 """Tools for results and datasets."""
 
-from __future__ import annotations
-
-import importlib
 import json
-import os
 import shlex
+import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
+from recordings import data_path
 from scenes import looking, rig_of
 
 from stseg.evaluation import evaluate
@@ -19,28 +16,23 @@ from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 
 ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
-with_data = pytest.mark.skipif(not DATA.exists(), reason="the data sets are not here")
+sys.path.append(str(ROOT / "tools"))
+
+import datasets  # noqa: E402
+import measure  # noqa: E402
+import pom_rig  # noqa: E402
+import results  # noqa: E402
+from result_sets import SETS  # noqa: E402
+from result_variants import VARIANTS  # noqa: E402
 
 
-@pytest.fixture(autouse=True)
-def tools(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The folder of tools, which is no part of the package, is on the path."""
-    monkeypatch.syspath_prepend(ROOT / "tools")
-
-
-@pytest.fixture
-def datasets() -> ModuleType:
-    return importlib.import_module("datasets")
-
-
-def test_cmc_counts_frames_from_one(datasets: ModuleType, tmp_path: Path) -> None:
+def test_cmc_counts_frames_from_one(tmp_path: Path) -> None:
     path = tmp_path / "truth.txt"
     path.write_text("1 4 -1 -1 -1 -1 -1 2.5 0.5 0.8 0.5 0.5 0.8\n\n3 5 -1 -1 -1 -1 -1 -1 2 0.8 0.5 0.5 0.8\n")
     assert datasets.cmc_truth(path).tolist() == [(0, 4, 2.5, 0.5, 0), (2, 5, -1.0, 2.0, 0)]
 
 
-def test_wildtrack_cells_become_metres_and_unseen_boxes_nothing(datasets: ModuleType, tmp_path: Path) -> None:
+def test_wildtrack_cells_become_metres_and_unseen_boxes_nothing(tmp_path: Path) -> None:
     views = [{"viewNum": view, "xmin": -1, "ymin": -1, "xmax": -1, "ymax": -1} for view in range(7)]
     views[6] |= {"xmin": 10, "ymin": 20, "xmax": 40, "ymax": 120}
     people = [{"personID": 9, "positionID": 480 * 360 + 120, "views": views}]
@@ -52,36 +44,29 @@ def test_wildtrack_cells_become_metres_and_unseen_boxes_nothing(datasets: Module
     assert (tmp_path / "boxes" / "CVLab1.csv").read_text() == header
 
 
-@with_data
-def test_the_truth_of_cmc_stands_in_its_room(datasets: ModuleType) -> None:
-    truth = datasets.cmc_truth(DATA / "cmc" / "GT_CMC2_WORLD_CENTROID.txt")
+def test_the_truth_of_cmc_stands_in_its_room() -> None:
+    truth = datasets.cmc_truth(data_path("cmc/GT_CMC2_WORLD_CENTROID.txt"))
     assert (len(truth), truth["frame"].min(), truth["frame"].max()) == (2076, 0, 260)
     assert len(np.unique(truth["id"])) == 10
     assert truth["x"].min() > 0 and truth["x"].max() < 7.67 and np.abs(truth["y"]).max() < 4
 
 
-@with_data
-def test_the_truth_of_wildtrack_is_its_own_perfect_track(datasets: ModuleType, tmp_path: Path) -> None:
-    truth = datasets.wildtrack_truth(DATA / "wildtrack" / "annotations_positions")
+def test_the_truth_of_wildtrack_is_its_own_perfect_track(tmp_path: Path) -> None:
+    truth = datasets.wildtrack_truth(data_path("wildtrack/annotations_positions"))
     assert np.unique(truth["frame"]).tolist() == list(range(200))
     assert truth["x"].min() >= -3 and truth["x"].max() <= 9 and truth["y"].min() >= -9 and truth["y"].max() <= 27
     datasets.write_truth_csv(tmp_path / "truth.csv", truth)
     assert evaluate(truth, read_tracks_csv(tmp_path / "truth.csv"), 0.3).hota == pytest.approx(100)
 
 
-@with_data
-def test_wildtrack_has_boxes_in_every_view(datasets: ModuleType, tmp_path: Path) -> None:
-    datasets.wildtrack_annotated_boxes(DATA / "wildtrack" / "annotations_positions", tmp_path)
+def test_wildtrack_has_boxes_in_every_view(tmp_path: Path) -> None:
+    datasets.wildtrack_annotated_boxes(data_path("wildtrack/annotations_positions"), tmp_path)
     for name in datasets.WILDTRACK_VIEWS:
         boxes = np.loadtxt(tmp_path / f"{name}.csv", delimiter=",", skiprows=1)
         assert len(np.unique(boxes[:, 0])) > 190 and (boxes[:, 3:] > 0).all()
 
 
-# Results
-
-
 def test_the_page_shows_trackers_side_by_side() -> None:
-    results = importlib.import_module("results")
     row = {"frames": "0:136", "MODA": "99.6", "IDF1": "98.04", "error_m": "0.03", "switches": "0"}
     text = "above\n<!-- table -->\nold\n<!-- end of table -->\nbelow\n"
     shown = results.page(text, {("uu4", "cut"): row, ("uu4", "kalman"): row | {"MODA": ""}})
@@ -91,13 +76,11 @@ def test_the_page_shows_trackers_side_by_side() -> None:
 
 
 def test_the_committed_page_shows_the_stored_rows() -> None:
-    results = importlib.import_module("results")
     text = results.PAGE.read_text(encoding="utf-8")
     assert results.page(text, results.stored()) == text
 
 
 def test_a_perturbed_rig_is_shifted_as_stated() -> None:
-    measure = importlib.import_module("measure")
     rig = rig_of([looking("west", (-3.5, -3.5, 2.6)), looking("east", (3.5, -3.4, 2.6))])
     for seed in range(20):
         moved = measure.perturbed_rig(rig, np.random.default_rng(seed))
@@ -110,11 +93,9 @@ def test_a_perturbed_rig_is_shifted_as_stated() -> None:
 
 
 def test_sets_are_commands_that_exist() -> None:
-    sets = importlib.import_module("result_sets").SETS
-    variants = importlib.import_module("result_variants").VARIANTS
-    assert [variant.name for variant in sets["easy"].variants] == list(variants)
-    assert [variant.name for variant in sets["dense_boxes"].variants] == ["cut", "frames", "kalman"]
-    for name, one in sets.items():
+    assert [variant.name for variant in SETS["easy"].variants] == list(VARIANTS)
+    assert [variant.name for variant in SETS["dense_boxes"].variants] == ["cut", "frames", "kalman"]
+    for name, one in SETS.items():
         run, score = one.run_command(one.variants[-1]), one.score_command(one.variants[-1])
         film = [] if one.film is None else [one.film]
         for command in [*film, *one.prepare, run, score]:
@@ -127,11 +108,10 @@ def test_sets_are_commands_that_exist() -> None:
 @pytest.mark.parametrize("option", [["--sets", "uu4,uu5"], ["--sets", "none", "--variants", "cut,uu5"]])
 def test_an_unknown_name_is_refused(option: list[str]) -> None:
     with pytest.raises(SystemExit, match="uu5: expected names among"):
-        importlib.import_module("results").main(option)
+        results.main(option)
 
 
 def test_pom_camera_is_fitted_to_its_rectangles() -> None:
-    pom_rig = importlib.import_module("pom_rig")
     homography = [[60.0, 35.0, 40.0], [4.0, -9.0, 110.0], [0.02, 0.12, 1.0]]
     camera = Camera("c", (160, 120), np.array(homography), np.array([0.5, -40.0, 0.01]))
     ground = np.random.default_rng(3).uniform(0, 1.2, (60, 2))
@@ -144,12 +124,10 @@ def test_pom_camera_is_fitted_to_its_rectangles() -> None:
     np.testing.assert_allclose(vertical * scale, camera.vertical, atol=1e-8)
 
 
-@with_data
 def test_pom_rig_sees_bodies_where_the_recording_says(tmp_path: Path) -> None:
-    pom_rig = importlib.import_module("pom_rig")
-    pom_rig.main(DATA / "pom", tmp_path / "pom.toml")
+    pom_rig.main(data_path("pom"), tmp_path / "pom.toml")
     for index, camera in enumerate(read_recording(tmp_path / "pom.toml").rig.cameras):
-        ground, rectangle = pom_rig.read_rectangles(DATA / "pom" / "test.pom", index)
+        ground, rectangle = pom_rig.read_rectangles(data_path("pom/test.pom"), index)
         whole = (rectangle[:, 0] > 0) & (rectangle[:, 2] < 159) & (rectangle[:, 3] < 119)
         pixel, ahead = camera.project(ground[whole], 0.0)
         foot = np.stack([rectangle[:, [0, 2]].mean(axis=1), rectangle[:, 3]], -1)[whole]
