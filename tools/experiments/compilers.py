@@ -1,11 +1,12 @@
 """Do the ways in which kernels are compiled agree? Tracks one rig by each and compares the run files.
 
-    python tools/experiment.py compilers --work FOLDER [--rig RIG.toml] [--frames 0:12] [--python OTHER]
+    python tools/experiment.py compilers --work FOLDER [--data ../shared/data] [--rig RIG.toml] [--frames A:B]
+        [--python OTHER]
 
 The default run and one by plain `numba.njit` must give the same bits. With --python, that interpreter (another version
-of numba) tracks the rig, too: it must find the same people in the same frames, to a millimetre. Without --rig, a
-simulated scene is tracked. The exit status is 1 where runs differ. CPU seconds are printed beside: with an empty
-NUMBA_CACHE_DIR they are those of a first run.
+of numba) tracks the rig, too: it must find the same people in the same frames, to a millimetre. Without --rig,
+frames of the recording `uu4` are tracked where DATA holds it, and else a simulated scene. The exit status is 1 where
+runs differ. CPU seconds are printed beside: with an empty NUMBA_CACHE_DIR they are those of a first run.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from workbench import ROOT
+from result_sets import SETS
+from workbench import ROOT, Bench
 
 from experiments.same import differences, digests
 from stseg.io.runfile.runs import read_run
@@ -51,20 +53,30 @@ def track_difference(run_file: Path, other_file: Path) -> float:
     return max((float(np.abs(rows[name] - others[name]).max(initial=0.0)) for name in ("x", "y")), default=0.0)
 
 
+def prepared(bench: Bench) -> tuple[Path, str]:
+    """A rig file and its frames: those of `uu4`, or of a simulated scene where the recording is not here."""
+    if bench.path("$DATA/uu4").exists():
+        for command in SETS["uu4"].prepare:
+            bench.do(command)
+        return bench.path(SETS["uu4"].rig), "0:40"
+    scene = ["--scene", "easy", "--seconds", "2", "--size", "320,240", "--overwrite"]
+    finish("scene", start(sys.executable, ["simulate", str(bench.work / "scene"), *scene]))
+    return bench.work / "scene" / "rig.toml", "0:12"
+
+
 def main() -> None:
     """Compare, a line for each way."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--work", type=Path, required=True, help="folder for the scene and the run files")
+    parser.add_argument("--work", type=Path, required=True, help="folder for the rig, the scene and the run files")
+    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--rig", type=Path)
-    parser.add_argument("--frames", default="0:12")
+    parser.add_argument("--frames", help="all frames of --rig, if not given; of the recording 0:40, of the scene 0:12")
     parser.add_argument("--python", help="an interpreter with another version of numba")
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
-    rig = options.rig
+    rig, frames = options.rig, ":"
     if rig is None:
-        rig = options.work / "scene" / "rig.toml"
-        scene = ["--scene", "easy", "--seconds", "2", "--size", "320,240", "--overwrite"]
-        finish("scene", start(sys.executable, ["simulate", str(rig.parent), *scene]))
+        rig, frames = prepared(Bench(options.data.resolve(), options.work.resolve()))
     ways: dict[str, tuple[str, dict[str, str]]] = {
         "default": (sys.executable, {}),
         "plain": (sys.executable, {"STSEG_PLAIN_NUMBA": "1"}),
@@ -72,7 +84,7 @@ def main() -> None:
     if options.python is not None:
         ways["other"] = options.python, {}
     files = {name: options.work / f"{name}.h5" for name in ways}
-    words = ["run", str(rig), "--frames", options.frames, "--workers", "1", "--overwrite", "-o"]
+    words = ["run", str(rig), "--frames", options.frames or frames, "--workers", "1", "--overwrite", "-o"]
     processes = {
         name: start(python, [*words, str(files[name])], **environment) for name, (python, environment) in ways.items()
     }
