@@ -34,8 +34,8 @@ _DECISION_MARGIN = 3.0
 """Least difference of score between a decision and its opposite, nats: 20 to 1."""
 _FITTING_GAIN = 3.0
 """Most that a candidate gains where its place and size are fitted to its pixels, nats: those of spoiled silhouettes."""
-_PREDICTION_DISTANCE = 0.10
-"""Greatest distance of a person from the prediction, metres: the resolution of places in one frame."""
+_PREDICTION_DISTANCE = 0.13
+"""Greatest distance of a person from the prediction, metres: by about as much a body strays from its track."""
 _FINAL_STEP = 0.02
 """Greatest step of a place that is not followed by another, metres: a quarter of the spacing of its patch."""
 _STEP_LIMIT = 3

@@ -100,7 +100,7 @@ class IdentityProblem:
         if self.colours is not None and len(earlier):
             axes = self.colours.of(earlier["colours"])
             value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, earlier["appearance_count"][:, None]
-        precision, information = self.model.evidence(value, self.frame_rate)
+        precision, information = self.model.evidence(value)
         return visits.after(earlier["id"], number * precision, number * information)
 
     def score(self, constraints: Constraints, since: float, until: float) -> float:

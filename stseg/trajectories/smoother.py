@@ -1,7 +1,13 @@
 """Short gaps of tracks are filled by linear interpolation, and places smoothed (Rauch, Tung and Striebel 1965).
 
-The motion model is that of the track filter; each row is a measurement with its own covariance. All tracks are smoothed
-at the same time: the first rows of all, then the second rows, and so on.
+The motion model is that of the track filter; each row is a measurement with its own covariance C = L L'. Most of its
+error lasts (`stseg.noise.lasting_error`): it is L u with a state u of its own, x, y, vx, vy, u1, u2 in all, where
+
+    u' = r u + N(0, (1 - r^2) I),  r = exp(-t / tau),    measured place = place + sqrt(b^2) L u + N(0, a^2 C)
+
+(an augmented state, Bar-Shalom, Li and Kirubarajan 2001, section 8.2). So a place is never surer than its lasting
+error allows, however many rows there are. All tracks are smoothed at the same time: the first rows of all, then the
+second rows, and so on.
 """
 
 from __future__ import annotations
@@ -13,6 +19,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig, TrackingConfig
 from stseg.geometry.distances import distances
+from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import TRAJECTORY
 from stseg.tracking.filter.motion_model import process_noise, transition
 from stseg.tracking.filter.track_filter import EXCLUSION_RADIUS
@@ -121,18 +128,20 @@ def smoothed_paths(
     before = np.arange(first, len(order)) - np.repeat(number[:-1], number[1:])
     seconds, ground, noise = seconds[order], ground[order][:, :, None], noise[order]
     motion, turn = _motions(seconds[first:] - seconds[before], model)
-    state, spread = np.zeros((len(order), 4, 1)), np.zeros((len(order), 4, 4))
-    state[:first, :2], spread[:first, :2, :2] = ground[:first], noise[:first]
-    spread[:first, [2, 3], [2, 3]] = model.speed_spread**2
+    matrix = _measurement(noise)
+    white = PLACE_ERROR.white * noise
+    state, spread = np.zeros((len(order), 6, 1)), np.zeros((len(order), 6, 6))
+    state[:first, :2], spread[:first] = ground[:first], _first_spread(noise[:first], matrix[:first], model)
     predicted, ahead = state.copy(), spread.copy()
     turns = [(slice(k - n, k - n + m), slice(k, k + m)) for k, n, m in zip(start, number, number[1:], strict=False)]
     for old, new in turns:
         rows = motion[new.start - first : new.stop - first]
         predicted[new] = rows @ state[old]
         ahead[new] = rows @ spread[old] @ rows.transpose(0, 2, 1) + turn[new.start - first : new.stop - first]
-        gain = ahead[new, :, :2] @ np.linalg.inv(ahead[new, :2, :2] + noise[new])
-        state[new] = predicted[new] + gain @ (ground[new] - predicted[new, :2])
-        spread[new] = ahead[new] - gain @ ahead[new, :2]
+        crossed = ahead[new] @ matrix[new].transpose(0, 2, 1)
+        gain = crossed @ np.linalg.inv(matrix[new] @ crossed + white[new])
+        state[new] = predicted[new] + gain @ (ground[new] - matrix[new] @ predicted[new])
+        spread[new] = ahead[new] - gain @ matrix[new] @ ahead[new]
     gains = spread[before] @ motion.transpose(0, 2, 1) @ np.linalg.inv(ahead[first:])
     for old, new in turns[::-1]:
         gain = gains[new.start - first : new.stop - first]
@@ -143,6 +152,23 @@ def smoothed_paths(
     return places, covariance
 
 
+def _measurement(noise: Floats) -> Floats:
+    """Matrix of a measured place by the state, from covariances (n, 2, 2): float64 (n, 2, 6)."""
+    matrix = np.zeros((len(noise), 2, 6))
+    matrix[:, :, :2] = np.eye(2)
+    matrix[:, :, 4:] = np.sqrt(PLACE_ERROR.lasting) * np.linalg.cholesky(noise)
+    return matrix
+
+
+def _first_spread(noise: Floats, matrix: Floats, model: MotionConfig) -> Floats:
+    """Covariance of the state after a first row, which alone says where the track is, float64 (n, 6, 6)."""
+    spread = np.zeros((len(noise), 6, 6))
+    spread[:, :2, :2], spread[:, :2, 4:] = noise, -matrix[:, :, 4:]
+    spread[:, 4:, :2], spread[:, 4:, 4:] = -matrix[:, :, 4:].transpose(0, 2, 1), np.eye(2)
+    spread[:, [2, 3], [2, 3]] = model.speed_spread**2
+    return spread
+
+
 def _by_turn(tracks: Sequence[Ints]) -> tuple[Ints, Ints]:
     """The first rows of all tracks, then their second rows, and so on, each of the longest first; number of each."""
     longest_first = sorted(tracks, key=len, reverse=True)
@@ -151,7 +177,11 @@ def _by_turn(tracks: Sequence[Ints]) -> tuple[Ints, Ints]:
 
 
 def _motions(seconds: Floats, model: MotionConfig) -> tuple[Floats, Floats]:
-    """F and Q over some times (n,), float64 (n, 4, 4)."""
+    """Transitions and process noise over some times (n,), float64 (n, 6, 6)."""
     steps, which = np.unique(seconds, return_inverse=True)
-    motions = np.array([transition(step) for step in steps.tolist()]).reshape(-1, 4, 4)
-    return motions[which], np.array([process_noise(step, model) for step in steps.tolist()]).reshape(-1, 4, 4)[which]
+    motions, noises = np.zeros((2, len(steps), 6, 6))
+    for motion, noise, step in zip(motions, noises, steps.tolist(), strict=True):
+        kept = np.exp(-step / PLACE_ERROR.seconds)
+        motion[:4, :4], motion[4:, 4:] = transition(step), kept * np.eye(2)
+        noise[:4, :4], noise[4:, 4:] = process_noise(step, model), (1.0 - kept**2) * np.eye(2)
+    return motions[which], noises[which]

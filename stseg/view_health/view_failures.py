@@ -6,9 +6,14 @@ it that is foreground, the mean over people, and the share c of all the rest, it
     J = h - c:
 
 1 for a view without errors, and 0 for one that shows nothing, everything or noise. A measurement counts for
-the time of a frame and person, and is forgotten quickly for J now and slowly for the usual J of the view. A view fails
-while its J now is less than 0.7 of its usual one: it is excluded until J has come back. The usual J stands while
-it fails, and counts in J now where few people were measured of late, so a view without people comes back by itself.
+the time of a frame and person, and is forgotten slowly for the usual J of the view, and quickly for its J now: over
+each of several spans. A view begins to fail when its J of one span is less than 0.7 of the usual one, and that is no
+chance: the difference is more than four of its standard deviations. The deviation is what the means over as many
+measurements have shown while the view was sound, so a detector that misses people in single frames excludes no view.
+A low J and its deviations count in the usual ones as soon as it has come back without a failure.
+A failing view is excluded until J of the shortest span has come back. The usual J and the deviation stand while it
+fails. The usual J counts in J now where few people were measured of late, so a view without people comes back by
+itself. A view of which each measurement deviates by s is found to show nothing after about (4 s / J)^2 measurements.
 
 A view that never showed more, since its calibration is wrong, has no better past to be measured by. Where its usual J
 is less than 0.7 of the median usual J of four other sound views or more, that median is expected of it; among fewer it
@@ -20,7 +25,7 @@ A camera that is pushed still shows people: `knocked_views` recognises it, and i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -39,8 +44,14 @@ ViewInput = TypeVar("ViewInput")
 
 _FAILURE_SHARE = 0.7
 """Share of its usual informedness below which a view fails."""
-_RECENT_MEMORY, _RECENT_FRAMES = 0.25, 3.0
-"""Time constant of the informedness now, seconds, and frames at least: a detector may miss many in one frame."""
+_SPANS, _SPAN_FRAMES = (0.25, 1.0, 4.0), (3.0, 1.0, 1.0)
+"""Time constants of the informedness now, seconds, and frames at least: the shortest says when a view is back."""
+_SIGNIFICANCE = 4.0
+"""Least deviation of a failing view from its usual informedness, standard deviations: one in 30,000 by chance."""
+_VARIANCE, _VARIANCE_TIME = 0.2, 5.0
+"""Variance of a measurement before the recording, and the time for which it counts, seconds."""
+_MEASURED = 0.5
+"""Least number of measurements in a span that is compared."""
 _USUAL_TIME = 2.0
 """Least time of one person by which the usual informedness of a view is estimated, seconds."""
 _USUAL_WEIGHT = 0.1
@@ -75,8 +86,14 @@ class ViewFailures:
         Views that show people beside their places.
     excluded : bool (view,)
         Views that are excluded from the last frame.
-    usual, recent : (view, 2)
+    usual : (view, 2)
         Weight, and weighted sum of the informedness; seconds of one person.
+    recent : one (view, 2) for each span
+        The same.
+    deviation : one (view, 2) for each span
+        Weight, and weighted sum of squared deviations, each times the number of measurements; seconds.
+    doubtful_usual, doubtful_deviation : (view, 2), (view, span, 2)
+        What is to be added to these since the informedness is low.
     """
 
     def __init__(self, views: int, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
@@ -84,7 +101,11 @@ class ViewFailures:
         self.failing, self.excluded = np.zeros(views, bool), np.zeros(views, bool)
         self.knocks = KnockedViews(views, body, frame_rate, config)
         self.usual = Forgetting((views, 2), frame_rate, config.memory)
-        self.recent = Forgetting((views, 2), frame_rate, _RECENT_MEMORY, _RECENT_FRAMES)
+        self.recent = [
+            Forgetting((views, 2), frame_rate, span, frames) for span, frames in zip(_SPANS, _SPAN_FRAMES, strict=True)
+        ]
+        self.deviation = [Forgetting((views, 2), frame_rate, config.memory) for _ in _SPANS]
+        self.doubtful_usual, self.doubtful_deviation = np.zeros((views, 2)), np.zeros((views, len(_SPANS), 2))
         self._frames = np.zeros(views, np.int64)
 
     def kept(self, inputs: Sequence[ViewInput]) -> list[ViewInput | None]:
@@ -129,17 +150,57 @@ class ViewFailures:
         seconds = number / self._rate
         self._frames[k] += number > 0
         counts = np.array([seconds, seconds * informedness])
-        self.recent.forget(k)
-        self.recent.add(counts, k)
+        for recent in self.recent:
+            recent.forget(k)
+            recent.add(counts, k)
+        self.doubtful_usual[k] += counts
         weight, total = self.usual.sums[k]
+        is_low = False
         if weight >= _USUAL_TIME:
             usual, of_others = total / weight, self._usual_of_others(k)
             expected = usual if usual >= _FAILURE_SHARE * of_others else of_others
-            weight, total = self.recent.with_prior(_USUAL_WEIGHT, np.array([1.0, usual]))[k]
-            self.failing[k] = total / weight < _FAILURE_SHARE * expected
-        if not (self.failing[k] or self.knocks.knocked[k]):
-            self.usual.forget(k)
-            self.usual.add(counts, k)
+            weight, total = self.recent[0].with_prior(_USUAL_WEIGHT, np.array([1.0, usual]))[k]
+            is_low = total / weight < _FAILURE_SHARE * expected
+            self.failing[k] = is_low and (self.failing[k] or self._is_significant(k, expected))
+            if number:
+                self._add_deviations(k, usual)
+        self._decide_doubtful(k, is_low)
+
+    def _decide_doubtful(self, k: int, is_low: bool) -> None:
+        """Count what is doubtful of view k in its usual informedness and deviation, or drop it where the view fails."""
+        if self.failing[k] or self.knocks.knocked[k]:
+            self.doubtful_usual[k] = self.doubtful_deviation[k] = 0.0
+            return
+        self.usual.forget(k)
+        for deviation in self.deviation:
+            deviation.forget(k)
+        if not is_low:
+            self.usual.add(self.doubtful_usual[k], k)
+            for deviation, doubtful in zip(self.deviation, self.doubtful_deviation[k], strict=True):
+                deviation.add(doubtful, k)
+            self.doubtful_usual[k] = self.doubtful_deviation[k] = 0.0
+
+    def _measurements(self, k: int) -> Iterator[tuple[int, float, float]]:
+        """Spans of view k that are compared: number of the span, of measurements in it, and their informedness."""
+        for span, recent in enumerate(self.recent):
+            weight, total = recent.sums[k]
+            if weight * self._rate > _MEASURED:
+                yield span, weight * self._rate, total / weight
+
+    def _is_significant(self, k: int, expected: float) -> bool:
+        """Whether the informedness of view k is less than expected over one span, and not by chance."""
+        for span, number, informedness in self._measurements(k):
+            weight, squares = self.deviation[span].with_prior(_VARIANCE_TIME, np.array([1.0, _VARIANCE]))[k]
+            deviation = float(np.sqrt(squares / weight / number))
+            if expected - informedness > max((1 - _FAILURE_SHARE) * expected, _SIGNIFICANCE * deviation):
+                return True
+        return False
+
+    def _add_deviations(self, k: int, usual: float) -> None:
+        """Add the deviations of the informedness of view k from its usual one to those that are doubtful."""
+        for span, number, informedness in self._measurements(k):
+            squares = number * (informedness - usual) ** 2
+            self.doubtful_deviation[k, span] += np.array([1.0, squares]) / self._rate
 
     def _usual_of_others(self, k: int) -> float:
         """The median of the usual informedness of sound views but view k, 0 where it has too few data."""

@@ -89,13 +89,13 @@ def drifting(rows: Rows, noise: float, differ: float, frames: int, name: str) ->
 def test_looks_that_last_are_believed_less_than_independent_ones() -> None:
     rows = walkers()
     fresh, lasting = appearance(rows, rows["id"], 1.0, 1.0, 4), drifting(rows, 0.2, 1.0, 16, "features")
-    assert learned(rows, lasting).model.lasting.min(initial=np.inf) > learned(rows, fresh).model.lasting.max()
+    assert learned(rows, lasting).model.row_variance.min(initial=np.inf) > learned(rows, fresh).model.row_variance.max()
 
 
 def test_a_weak_axis_lasts_as_long_as_tracklets_say() -> None:
     """Nobody is confused by the other axes, whatever is believed of how long errors last."""
     rows = walkers()
-    lasting = learned(rows, drifting(rows, 0.2, 3.0, 4, "colours")).model.lasting
+    lasting = learned(rows, drifting(rows, 0.2, 3.0, 4, "colours")).model.row_variance
     assert lasting.max() > 1.5 * lasting.min()
 
 

@@ -32,7 +32,9 @@ from stseg.io.runfile.runs import read_run
 from stseg.records.tables import APPEARANCE
 from stseg.tracking.row_groups import isolated_tracklets
 
-MODEL = SizeModel(np.array([1.7]), np.array([0.03**2]), np.array([0.5]), np.array([0.1**2]), np.full(1, np.inf))
+MODEL = SizeModel(
+    np.array([1.7]), np.array([0.03**2]), np.array([0.03**2 * 0.5 * RATE]), np.array([0.1**2]), np.full(1, np.inf)
+)
 LONGEST = 1.0
 
 
@@ -152,9 +154,9 @@ def test_outliers_say_no_more_against_a_person_than_they_may(most: float, people
 def test_noise_and_spread_of_a_size_are_learned() -> None:
     people = np.random.default_rng(1).normal(1.7, 0.2, 60)
     model = learn_sizes(*sizes_of(people, 0.03), RATE)
-    assert model.noise[0] == pytest.approx(0.03**2, rel=0.15)
+    assert model.variance[0] == pytest.approx(0.03**2, rel=0.15)
     assert model.spread[0] == pytest.approx(0.2**2, rel=0.3)
-    assert model.lasting[0] < 3 / RATE
+    assert model.row_variance[0] < 3 * model.variance[0]
 
 
 def test_a_size_that_is_everybodys_tells_nobody_apart() -> None:

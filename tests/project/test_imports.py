@@ -26,8 +26,8 @@ STAGES: dict[str, set[str]] = {
     "occupancy": set(),
     "segmentation": {SOLVER},
     "tracking": set(),
-    "identities": {"tracking"},
-    "trajectories": {"tracking", "identities"},
+    "identities": {"noise", "tracking"},
+    "trajectories": {"noise", "tracking", "identities"},
     "pixel_labels": {SOLVER},
 }
 """In the order of the data: what each may import besides the foundation. What two share is a record of `records`."""

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import block_diag
 from scipy.spatial.distance import cdist
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig
+from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
 from stseg.trajectories.final_tracks import FinalTracks, final_tracks
 from stseg.trajectories.pruning import coincident
@@ -195,22 +197,21 @@ PACE = 0.8
 def conditioned(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """The same, as one joint Gaussian of all places of one path, conditioned on all measurements at once.
 
-    The first place is known by its measurement alone, so the prior is written relative to it: place at t is
-    first + t v + the twice integrated white noise, whose covariance at s <= t is turn^2 s^2 (3 t - s) / 6.
+    Nothing is known of the first place (universal kriging); a place at t is first + t v + the twice integrated white
+    noise, whose covariance at s <= t is turn^2 s^2 (3 t - s) / 6.
     """
     n, since = len(seconds), seconds - seconds[0]
     early, late = np.minimum.outer(since, since), np.maximum.outer(since, since)
     along = MOTION.velocity_noise**2 * early**2 * (3 * late - early) / 6 + PACE**2 * np.outer(since, since)
-    prior = np.kron(along, np.eye(2)) + np.kron(np.ones((n, n)), noise[0])
-    measured = np.zeros((2 * n - 2, 2 * n))
-    measured[:, 2:] = np.eye(2 * n - 2)
-    error = np.zeros((2 * n - 2, 2 * n - 2))
-    for k, own in enumerate(noise[1:]):
-        error[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = own
-    gain = prior @ measured.T @ np.linalg.inv(measured @ prior @ measured.T + error)
-    mean = np.tile(ground[0], n)
-    mean = mean + gain @ (ground[1:].ravel() - measured @ mean)
-    covariance = prior - gain @ measured @ prior
+    prior, root = np.kron(along, np.eye(2)), block_diag(*np.linalg.cholesky(noise))
+    alike = PLACE_ERROR.lasting * np.exp(-np.abs(np.subtract.outer(since, since)) / PLACE_ERROR.seconds)
+    error = root @ np.kron(alike, np.eye(2)) @ root.T + PLACE_ERROR.white * block_diag(*noise)
+    anywhere, weight = np.tile(np.eye(2), (n, 1)), np.linalg.inv(prior + error)
+    of_first = np.linalg.inv(anywhere.T @ weight @ anywhere)
+    first = anywhere @ of_first @ anywhere.T @ weight @ ground.ravel()
+    mean = first + prior @ weight @ (ground.ravel() - first)
+    rest = anywhere - prior @ weight @ anywhere
+    covariance = prior - prior @ weight @ prior + rest @ of_first @ rest.T
     return mean.reshape(n, 2), np.stack([covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in range(n)])
 
 

@@ -115,6 +115,20 @@ def test_of_two_views_neither_fails() -> None:
     assert not learned.failures.failing.any()
 
 
+@pytest.mark.parametrize("missed", [0.1, 0.25])
+def test_a_detector_that_misses_boxes_excludes_no_view(missed: float) -> None:
+    """Of few people one box more or less is a large share; a view that then shows nothing is still found out."""
+    (asked, learned), rng, excluded = session("boxes"), np.random.default_rng(6), 0
+    standing = STANDING[:2]
+    seen = [view for view in shown("boxes", standing) if isinstance(view, Boxes)]
+    for _ in range(300):
+        explained(asked, learned, [view.of(rng.random(len(view)) >= missed) for view in seen], 1)
+        excluded += int(learned.failures.failing.sum())
+    assert excluded <= 0.01 * 300 * len(seen)
+    explained(asked, learned, failed("boxes", "black", seen), 12)
+    assert learned.failures.failing.tolist() == [k == FAILED for k in range(4)]
+
+
 def delivered(kind: str, standing: Floats) -> list[Observation]:
     if kind == "boxes":
         return [boxes(camera, standing) for camera in room().cameras]

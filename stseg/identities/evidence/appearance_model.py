@@ -20,7 +20,8 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.identities.evidence.appearance_axes import WRONG, Axes, discriminant_axes, independent_frames
-from stseg.identities.evidence.size_model import SizeModel, SizePrior, frame_errors, measured_tracklets
+from stseg.identities.evidence.size_model import SizeModel, SizePrior, measured_tracklets
+from stseg.noise.lasting_error import constant_errors
 
 _LEAST_FRAMES = 8
 """Least frames of half a person's time."""
@@ -142,9 +143,9 @@ def _learned(
     number, along = len(axes.spread), axes.of(value)
     # Where all pairs are far apart, they do not say how long errors last, but differences within tracklets do.
     measured = measured_tracklets(value[:, 0], tracklets)
-    noise, alike = frame_errors(np.ascontiguousarray(along.T), frame, measured, _UNIT_PRIOR, frame_rate)
-    seconds = np.maximum(lasting / frame_rate, noise * alike)
+    errors = constant_errors(np.ascontiguousarray(along.T), frame, measured, _UNIT_PRIOR.errors(number), frame_rate)
+    row_variance = np.maximum(lasting, errors.row_variance(frame_rate))
     # An observation may be of a person in front: under a share of such errors none says more than this against one.
     most_against = np.full(number, -np.log(WRONG) / max(number, 1))
-    model = SizeModel(np.zeros(number), np.ones(number), seconds, axes.spread, most_against)
+    model = SizeModel(np.zeros(number), np.ones(number), row_variance, axes.spread, most_against)
     return LearnedAppearance(along, model, axes)

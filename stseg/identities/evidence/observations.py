@@ -10,13 +10,12 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.config import Config
 from stseg.identities.evidence.size_model import SizeModel
+from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.border import Border
 from stseg.tracking.row_groups import near_rows
 
 _EXCHANGE_DISTANCE = 0.8
 """Distance below which the filter may have exchanged two tracks, metres."""
-_ERROR_TIME = 0.4
-"""Correlation time of the error of a place, seconds: frames within it say less than independent ones."""
 _BIRTH_TIME = 1.0
 """Time within which births in one track count as one, seconds."""
 _LEAST_PLACE_ERROR = 0.05
@@ -115,10 +114,10 @@ def observe(
     rows = trajectory[order]
     frames, start = np.unique(rows["frame"], return_index=True)
     ground = np.column_stack([rows["x"], rows["y"]])
-    precision, information = model.evidence(sizes[order], frame_rate)
+    precision, information = model.evidence(sizes[order])
     previous = _previous(rows)
     start = np.append(start, len(rows))
-    alike = 1.0 + 2.0 * _ERROR_TIME * frame_rate
+    alike = PLACE_ERROR.row_variance(frame_rate)
     return Observations(
         order, start, frames / frame_rate, ground,
         np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2), previous,

@@ -169,5 +169,5 @@ def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rule
     """The constants of the search."""
     return Rules(
         _BIRTH, _ABSENCE, _LEAST_PLACE, limits.longest, _ALTERNATIVE_LOSS, _BEAM_LOSS, motion.velocity_noise**2,
-        motion.speed_spread**2, sizes.spread, sizes.most_against * sizes.noise,
+        motion.speed_spread**2, sizes.spread, sizes.most_against * sizes.variance,
     )  # fmt: skip

@@ -43,6 +43,14 @@ class Measurement(NamedTuple):
     variance: float
 
 
+class PlacePosterior(NamedTuple):
+    """Posterior of a body's place, float64 (2,), (2, 2), metres, and the variance of a body about its track's place."""
+
+    ground: Floats
+    covariance: Floats
+    noise: float
+
+
 class TrackState(NamedTuple):
     """State of one track at its last detection.
 
@@ -80,38 +88,40 @@ class TrackState(NamedTuple):
             width_variance=self.width_variance + _SIZE_DRIFT**2 * seconds,
         )
 
-    def corrected(
-        self, frame: int, ground: Floats, covariance: Floats, height: Measurement, width: Measurement, odds: float
-    ) -> TrackState:
+    def corrected(self, frame: int, place: PlacePosterior, height: Measurement, width: Measurement) -> TrackState:
         """The predicted state after a detection.
+
+        The body's place b strays from that of the track, N(b; x, q I), and the detector gives the posterior of b under
+        the prior N(x, P + q I) of this prediction. Given b the measurement says nothing more, so mean and covariance of
+        the state follow from those of b by its regression on b (Bar-Shalom, Li and Kirubarajan 2001, section 1.4.14).
 
         Parameters
         ----------
         frame
             Of the detection.
-        ground, covariance : float64 (2,), (2, 2)
-            Posterior of the place, of which this prediction is taken to be the whole prior. The detector's prior is
-            wider, by `motion.position_noise` (`predict`), so the corrected covariance is too small where people
-            stray by as much. The velocity follows by their covariance.
+        place
+            The posterior of the body's place.
         height, width
             Measurements, without this prediction as their prior.
-        odds
-            Log-odds of existence, nats.
         """
-        gain = self.covariance[:, :2] @ np.linalg.inv(self.covariance[:2, :2])
-        surplus = self.covariance[:2, :2] - covariance
+        prior = self.covariance[:2, :2] + place.noise * np.eye(2)
+        gain = self.covariance[:, :2] @ np.linalg.inv(prior)
+        surplus = prior - place.covariance
+        return self.resized(height, width)._replace(
+            last_seen=frame,
+            state=self.state + gain @ (place.ground - self.state[:2]),
+            covariance=self.covariance - gain @ surplus @ gain.T,
+        )
+
+    def resized(self, height: Measurement, width: Measurement) -> TrackState:
+        """The state after measurements of its sizes."""
         tall = self.height_variance / (self.height_variance + height.variance)
         wide = self.width_variance / (self.width_variance + width.variance)
-        return TrackState(
-            self.track,
-            frame,
-            self.state + gain @ (ground - self.state[:2]),
-            self.covariance - gain @ surplus @ gain.T,
-            self.height + tall * (height.mean - self.height),
-            self.height_variance * (1 - tall),
-            self.width + wide * (width.mean - self.width),
-            self.width_variance * (1 - wide),
-            odds,
+        return self._replace(
+            height=self.height + tall * (height.mean - self.height),
+            height_variance=self.height_variance * (1 - tall),
+            width=self.width + wide * (width.mean - self.width),
+            width_variance=self.width_variance * (1 - wide),
         )
 
 
@@ -163,25 +173,18 @@ class TrackFilter:
         """
         self.begun = True
         heights, widths = self._measured(people)
-        predicted = self._predictions(frame)
+        predicted, noise = self._predictions(frame), self.motion.position_noise**2
         names, detected = np.zeros(len(people), np.int64), []
-        for j in range(len(people)):
-            index = int(people.track_index[j])
-            before = predicted[index] if index >= 0 else self._birth(frame, people, j)
-            odds = (before.odds if index >= 0 else self.birth_log_odds) + people.evidence[j] - people.prior[j]
-            detected.append(
-                before.corrected(
-                    frame,
-                    people.ground[j],
-                    people.covariance[j],
-                    heights[j],
-                    widths[j],
-                    min(float(odds), DETECTED_LOG_ODDS),
-                )
-            )
-            if before.track == 0:
+        for j, index in enumerate(people.track_index.tolist()):
+            if index >= 0:
+                place = PlacePosterior(people.ground[j], people.covariance[j], noise)
+                track, before = predicted[index].corrected(frame, place, heights[j], widths[j]), predicted[index].odds
+            else:
+                track, before = self._birth(frame, people, j).resized(heights[j], widths[j]), self.birth_log_odds
+            if track.track == 0:
                 self.issued += 1
-                detected[-1] = detected[-1]._replace(track=self.issued)
+            odds = min(float(before + people.evidence[j] - people.prior[j]), DETECTED_LOG_ODDS)
+            detected.append(track._replace(track=track.track or self.issued, odds=odds))
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = [track.state[:2] for track in detected] + [predicted[k].state[:2] for k in missed]

@@ -1,0 +1,141 @@
+"""Errors that last: how much of an error is new in each frame, how much lasts, and for how long.
+
+Places, sizes and appearance of a person err by
+
+    cov(e_s, e_t) = a^2 [s = t] + b^2 exp(-|s - t| / tau)
+
+with a the noise of a frame, and b what lasts for tau: gait, pose, the views that see the person. So n rows in a row
+hold less than n rows' information: over a long time the mean of n has the variance
+
+    (a^2 + b^2 (1 + r) / (1 - r)) / n,    r = exp(-1 / (tau rate)).
+
+Of what is constant for a person they are found from differences over every lag that the recording bears: half the
+mean squared difference over m frames (the variogram, Cressie 1993, section 2.4) is
+
+    a^2 + b^2 (1 - r^m).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+
+_TIMES = np.geomspace(0.1, 25.6, 17)
+"""Time constants that are tried, seconds."""
+_LONGEST = 15.0
+"""Longest lag, seconds."""
+_LEAST_DIFFERENCES = 20
+"""Least number of differences over a lag."""
+_PRIOR_DIFFERENCES = 50.0
+"""Weight of the prior: differences over each lag."""
+
+
+@dataclass(frozen=True)
+class LastingError:
+    """Errors of some quantities, all float64 (quantity,).
+
+    Attributes
+    ----------
+    white, lasting
+        a^2 and b^2, in the square of the quantity's unit.
+    seconds
+        tau.
+    """
+
+    white: Floats
+    lasting: Floats
+    seconds: Floats
+
+    @property
+    def variance(self) -> Floats:
+        """Variance of the error of one row."""
+        return np.asarray(self.white + self.lasting)
+
+    def row_variance(self, frame_rate: float) -> Floats:
+        """Variance of a row that counts as independent of the rows of the frames around it."""
+        kept = np.exp(-1.0 / (self.seconds * frame_rate))
+        return np.asarray(self.white + self.lasting * (1.0 + kept) / (1.0 - kept))
+
+    def mean_variance(self, frames: Ints, frame_rate: float) -> Floats:
+        """Variance of the mean of rows in frames int64 (n,), float64 (quantity,)."""
+        lag = np.abs(frames[:, None] - frames) / frame_rate
+        alike = np.array([np.exp(-lag / seconds).mean() for seconds in self.seconds.tolist()])
+        return np.asarray(self.white / len(frames) + self.lasting * alike)
+
+
+PLACE_ERROR = LastingError(np.array(0.2), np.array(0.8), np.array(1.0))
+"""The error of a place in shares of its covariance: pose, gait and the views that see a person last for a second.
+
+A recording without truth does not show how long: a place that errs slowly looks like one that moves.
+"""
+
+
+def constant_errors(
+    values: Floats, frame: Ints, tracklets: Sequence[Ints], prior: LastingError, rate: float
+) -> LastingError:
+    """Errors of quantities that are constant for each person.
+
+    Parameters
+    ----------
+    values : float64 (quantity, n)
+        Of each row; all are measured in the same rows.
+    frame : int64 (n,)
+        Frame of each row.
+    tracklets
+        Measured rows of each isolated tracklet, in the order of time.
+    prior
+        The errors before the recording.
+    rate
+        Frames per second.
+    """
+    lags = _lags(frame, tracklets, rate)
+    squares, count = np.zeros((len(values), len(lags))), np.zeros(len(lags))
+    for rows in tracklets:
+        for k, (earlier, later) in enumerate(_pairs(frame[rows], lags)):
+            squares[:, k] += 0.5 * ((values[:, rows[later]] - values[:, rows[earlier]]) ** 2).sum(1)
+            count[k] += len(later)
+    return _fitted(squares, count, lags / rate, prior)
+
+
+def _lags(frame: Ints, tracklets: Sequence[Ints], rate: float) -> Ints:
+    """Growing lags up to the longest that some tracklets bear, frames."""
+    longest = max((int(frame[rows[-1]] - frame[rows[0]]) for rows in tracklets), default=1)
+    most = max(min(longest // 2, round(_LONGEST * rate)), 1)
+    return np.unique(np.rint(np.geomspace(1, most, 24)).astype(np.int64))
+
+
+def _pairs(frames: Ints, lags: Ints) -> list[tuple[Ints, Ints]]:
+    """Indices of the earlier and the later row of each pair that is a lag apart, for each lag."""
+    after = np.searchsorted(frames, frames + lags[:, None]).clip(max=len(frames) - 1)
+    paired = frames[after] - frames == lags[:, None]
+    return [(np.flatnonzero(which), later[which]) for later, which in zip(after, paired, strict=True)]
+
+
+def _fitted(squares: Floats, count: Floats, seconds: Floats, prior: LastingError) -> LastingError:
+    """Errors by sums of half squared differences (quantity, lag), their numbers (lag,), and the lags (lag,)."""
+    enough = count >= _LEAST_DIFFERENCES
+    enough[0] = True
+    squares, count, seconds = squares[:, enough], count[enough], seconds[enough]
+    of_prior = 1.0 - np.exp(-seconds / prior.seconds[:, None])
+    expected = prior.white[:, None] + prior.lasting[:, None] * of_prior
+    measured = (squares + _PRIOR_DIFFERENCES * expected) / (count + _PRIOR_DIFFERENCES)
+    # What lasts longer than the longest lag cannot be told from what is constant.
+    times = _TIMES[: max(int(np.searchsorted(_TIMES, seconds[-1], "right")), 1)]
+    shapes = 1.0 - np.exp(-seconds / times[:, None])
+    found = [_fit(value, count + _PRIOR_DIFFERENCES, shapes, times) for value in measured]
+    return LastingError(*np.array(found, np.float64).reshape(-1, 3).T)
+
+
+def _fit(measured: Floats, count: Floats, shapes: Floats, times: Floats) -> tuple[float, float, float]:
+    """a^2, b^2 and tau of least squares; a mean of squares errs in proportion to itself."""
+    from scipy.optimize import nnls  # a start that fits nothing is faster without it
+
+    weight = np.sqrt(count) / np.maximum(measured, 1e-12)
+    fits = [nnls(np.column_stack([weight, weight * shape]), weight * measured) for shape in shapes]
+    best = int(np.argmin([residual for _, residual in fits]))
+    white, lasting = fits[best][0].tolist()
+    return white, lasting, float(times[best])
