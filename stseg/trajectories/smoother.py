@@ -156,7 +156,12 @@ def _measurement(noise: Floats) -> Floats:
     """Matrix of a measured place by the state, from covariances (n, 2, 2): float64 (n, 2, 6)."""
     matrix = np.zeros((len(noise), 2, 6))
     matrix[:, :, :2] = np.eye(2)
-    matrix[:, :, 4:] = np.sqrt(PLACE_ERROR.lasting) * np.linalg.cholesky(noise)
+    # The Cholesky factor in closed form: it takes a covariance without rank, too, as of a place that is said exactly.
+    first = np.sqrt(np.maximum(noise[:, 0, 0], 0.0))
+    slant = np.divide(noise[:, 0, 1], first, out=np.zeros_like(first), where=first > 0)
+    second = np.sqrt(np.maximum(noise[:, 1, 1] - slant**2, 0.0))
+    matrix[:, :, 4:] = np.stack([first, 0 * first, slant, second], 1).reshape(-1, 2, 2)
+    matrix[:, :, 4:] *= np.sqrt(PLACE_ERROR.lasting)
     return matrix
 
 

@@ -251,6 +251,15 @@ def test_a_single_measurement_stays_what_it_is() -> None:
     np.testing.assert_array_equal(spread, noise)
 
 
+@pytest.mark.parametrize(("yy", "xy"), [(0.0, 0.0), (0.01, 0.01), (0.01, 0.0100001)])
+def test_covariances_without_full_rank_are_smoothed(yy: float, xy: float) -> None:
+    """Rows that say their place exactly, or along one line, or that float32 has rounded."""
+    ground, noise = np.array([[0.1 * k, 0.2] for k in range(4)]), np.tile([[yy, xy], [xy, yy]], (4, 1, 1))
+    places, spread = smoothed_paths(np.arange(4) / SMOOTHER_RATE, ground, noise, [np.arange(4)], MOTION)
+    assert np.isfinite(places).all() and np.isfinite(spread).all()
+    np.testing.assert_allclose(places, ground, atol=0.1)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
     """Two people at once, one of them seen in every third frame only; raw places stay."""
