@@ -94,7 +94,8 @@ class Grid:
 
     def touching(self, rectangle: tuple[float, float, float, float]) -> Flags:
         """Cells that a rectangle x0, y0, x1, y1 touches, metres, bool (y, x)."""
-        (x0, y0, x1, y1), half = rectangle, self.cell / 2
+        # A point between two cells touches both, and rounding must not leave it to neither.
+        (x0, y0, x1, y1), half = rectangle, self.cell / 2 * (1 + 1e-9)
         columns = (self.ground_x >= x0 - half) & (self.ground_x <= x1 + half)
         rows = (self.ground_y >= y0 - half) & (self.ground_y <= y1 + half)
         return rows[:, None] & columns

@@ -331,3 +331,12 @@ def test_boxes_of_a_run_are_in_the_pixels_of_the_images(tmp_path: Path) -> None:
     for side in ("left", "top", "width", "height"):
         one, other = (np.median(table[side]) for table in last)
         assert one == pytest.approx(other, abs=0.05 * 320)
+
+
+@given(numbers(-3.0, 0.0), numbers(0.03, 0.5), st.integers(1, 40))
+def test_a_point_between_two_cells_touches_both(start: float, cell: float, columns: int) -> None:
+    grid = Grid((start, start + 41 * cell), (0.0, 2 * cell), cell=cell, top=1.0, planes=1)
+    point = (start + columns * cell, cell)
+    touched = grid.touching((*point, *point))
+    assert touched[0].sum() == 2
+    assert touched[0, columns - 1 : columns + 1].all()
