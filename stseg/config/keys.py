@@ -14,7 +14,7 @@ from stseg.config import Config
 from stseg.errors import ConfigError
 
 _USER = {
-    "body": "height_mean height_spread width_mean width_spread heights box_heights",
+    "body": "height_mean height_spread width_mean width_spread heights",
     "motion": "speed_spread velocity_noise position_noise",
     "foreground": "model body_rows",
     "foreground.mixture": "memory absorption_time darkest_shadow",

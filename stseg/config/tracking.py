@@ -129,8 +129,6 @@ class BodyConfig(Settings):
     """Weight of these means and spreads: seconds of one person; sizes that the run measures count beside them."""
     heights: tuple[float, ...] = (1.0, 1.25, 1.5, 1.6, 1.7, 1.8, 1.9)
     """Heights that the search for candidates tries, metres, rising."""
-    box_heights: tuple[float, ...] = (1.5, 1.6, 1.7, 1.8, 1.9)
-    """The same for boxes, fewer: the box of a half-occluded adult looks like that of a child at another position."""
 
     def width_of(self, height: Floats) -> Floats:
         """Mean width of bodies of given heights, both metres: that of all, less in proportion for small ones."""
@@ -141,11 +139,9 @@ class BodyConfig(Settings):
         super().__post_init__()
         require(self.height_mean > 2 * self.height_spread, self, "height_mean", "more than two standard deviations")
         require(self.width_mean > 2 * self.width_spread, self, "width_mean", "more than two standard deviations")
-        for name in ("heights", "box_heights"):
-            heights = getattr(self, name)
-            require(len(heights) > 0 and min(heights) > 0, self, name, "one or more heights above 0 m")
-            in_order = list(heights) == sorted(heights) and max(heights) <= _TALLEST
-            require(in_order, self, name, f"rising, at most {_TALLEST} m")
+        require(len(self.heights) > 0 and min(self.heights) > 0, self, "heights", "one or more heights above 0 m")
+        in_order = list(self.heights) == sorted(self.heights) and max(self.heights) <= _TALLEST
+        require(in_order, self, "heights", f"rising, at most {_TALLEST} m")
 
 
 @dataclass(frozen=True)

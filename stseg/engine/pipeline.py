@@ -9,7 +9,6 @@ What is learned from a recording, and its frames, are of a `stseg.engine.session
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from importlib import import_module
 from typing import Protocol, cast
 
@@ -67,9 +66,8 @@ class Pipeline:
         self, rig: Rig, kinds: Sequence[str], config: Config, tracker: str, axes: Floats | None = None
     ) -> None:
         self.rig, self.config, self.tracker = rig, config, find_tracker(tracker)
-        body = replace(config.body, heights=config.body.box_heights) if "boxes" in kinds else config.body
-        self.detector = Detector(rig, kinds, config.detection, body, config.error_rates)
-        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, body, config.error_rates)
+        self.detector = Detector(rig, kinds, config.detection, config.body, config.error_rates)
+        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, config.body, config.error_rates)
         self.proposals = find_candidate_source(rig, kinds, config)
         self.axes = axes
 

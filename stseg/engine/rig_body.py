@@ -41,10 +41,9 @@ def with_body_of(recording: Recording, config: Config) -> Config:
         if chosen[mean] <= 2 * chosen[spread]:
             place = f"[body] of {recording.path}"
             raise ConfigError(place, f"{size}_mean", chosen[mean], f"more than twice the spread, {chosen[spread]}")
-    for tried in ("heights", "box_heights"):
-        if {"height_mean", "height_spread"} & given.keys() and getattr(config.body, tried) == getattr(_DEFAULT, tried):
-            mean, spread = (given.get(name, getattr(config.body, name)) for name in ("height_mean", "height_spread"))
-            given[tried] = tuple(float(h) for h in (mean + spread * _TRIED).round(3).clip(0.05, limits.BODY[1]))
+    if {"height_mean", "height_spread"} & given.keys() and config.body.heights == _DEFAULT.heights:
+        mean, spread = (given.get(name, getattr(config.body, name)) for name in ("height_mean", "height_spread"))
+        given["heights"] = tuple(float(h) for h in (mean + spread * _TRIED).round(3).clip(0.05, limits.BODY[1]))
     if not given:
         return config
     return replace(config, body=replace(config.body, **given), detection=_with_room_for(given, config.detection))

@@ -9,10 +9,11 @@ hold less than n rows' information: over a long time the mean of n has the varia
 
     (a^2 + b^2 (1 + r) / (1 - r)) / n,    r = exp(-1 / (tau rate)).
 
-Of what is constant for a person they are found from differences over every lag that the recording bears: half the
-mean squared difference over m frames (the variogram, Cressie 1993, section 2.4) is
+Of what is constant for a person they are found from n differences over each lag of m frames that the recording bears:
 
-    a^2 + b^2 (1 - r^m).
+    a^2 + b^2 (1 - r^m) = 1/2 (mean of sqrt |difference|)^4 / (0.457 + 0.494 / n),
+
+a variogram that few outliers hardly change (Cressie and Hawkins 1980, eq 10): a person who sits down is no error.
 """
 
 from __future__ import annotations
@@ -93,12 +94,14 @@ def constant_errors(
         Frames per second.
     """
     lags = _lags(frame, tracklets, rate)
-    squares, count = np.zeros((len(values), len(lags))), np.zeros(len(lags))
+    roots, count = np.zeros((len(values), len(lags))), np.zeros(len(lags))
     for rows in tracklets:
         for k, (earlier, later) in enumerate(_pairs(frame[rows], lags)):
-            squares[:, k] += 0.5 * ((values[:, rows[later]] - values[:, rows[earlier]]) ** 2).sum(1)
+            roots[:, k] += np.sqrt(np.abs(values[:, rows[later]] - values[:, rows[earlier]])).sum(1)
             count[k] += len(later)
-    return _fitted(squares, count, lags / rate, prior)
+    number = np.maximum(count, 1.0)
+    variogram = 0.5 * (roots / number) ** 4 / (0.457 + 0.494 / number)
+    return _fitted(variogram, count, lags / rate, prior)
 
 
 def _lags(frame: Ints, tracklets: Sequence[Ints], rate: float) -> Ints:
@@ -115,14 +118,14 @@ def _pairs(frames: Ints, lags: Ints) -> list[tuple[Ints, Ints]]:
     return [(np.flatnonzero(which), later[which]) for later, which in zip(after, paired, strict=True)]
 
 
-def _fitted(squares: Floats, count: Floats, seconds: Floats, prior: LastingError) -> LastingError:
-    """Errors by sums of half squared differences (quantity, lag), their numbers (lag,), and the lags (lag,)."""
+def _fitted(variogram: Floats, count: Floats, seconds: Floats, prior: LastingError) -> LastingError:
+    """Errors by the variogram (quantity, lag), the numbers of differences (lag,), and the lags (lag,)."""
     enough = count >= _LEAST_DIFFERENCES
     enough[0] = True
-    squares, count, seconds = squares[:, enough], count[enough], seconds[enough]
+    variogram, count, seconds = variogram[:, enough], count[enough], seconds[enough]
     of_prior = 1.0 - np.exp(-seconds / prior.seconds[:, None])
     expected = prior.white[:, None] + prior.lasting[:, None] * of_prior
-    measured = (squares + _PRIOR_DIFFERENCES * expected) / (count + _PRIOR_DIFFERENCES)
+    measured = (count * variogram + _PRIOR_DIFFERENCES * expected) / (count + _PRIOR_DIFFERENCES)
     # What lasts longer than the longest lag cannot be told from what is constant.
     times = _TIMES[: max(int(np.searchsorted(_TIMES, seconds[-1], "right")), 1)]
     shapes = 1.0 - np.exp(-seconds / times[:, None])

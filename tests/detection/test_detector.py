@@ -24,6 +24,7 @@ from scenes import (
 )
 
 from stseg.arrays import Floats, Ints, ViewEvidence
+from stseg.config import BodyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Camera, Rig
 from stseg.records.people import Explanation
@@ -76,6 +77,16 @@ def test_a_child_is_found_though_its_height_is_not_tried(place: tuple[float, flo
     explanation = detector_of("pixels").explain(observed("pixels", room().cameras, standing), None)
     assert_found(explanation, standing)
     np.testing.assert_allclose(explanation.people.height, 1.0, atol=0.11)
+
+
+@pytest.mark.parametrize("tall", [1.0, 1.2, 1.4])
+def test_a_child_among_adults_is_found_by_boxes(tall: float) -> None:
+    cameras = tuple(looking(f"{x}{y}", (x, y, 2.4), size=(640, 480), focal=375.0) for x in (-3, 3) for y in (-3, 3))
+    standing = people((0.3, -0.4, tall), (-0.8, 0.3, 1.75))
+    detector = Detector(rig_of(cameras), ["boxes"] * 4, FEW_HEIGHTS, BodyConfig())
+    explanation = detector.explain(observed("boxes", cameras, standing), None)
+    index = assert_found(explanation, standing)
+    np.testing.assert_allclose(explanation.people.height[index], standing[:, 2], atol=0.15)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -60,3 +60,10 @@ def test_a_short_recording_keeps_the_prior() -> None:
     errors = found(values, frame)
     assert errors.variance[0] > 0.1 * PRIOR.variance[0]
     assert np.isfinite(errors.row_variance(RATE)).all()
+
+
+def test_people_who_sit_down_are_no_errors() -> None:
+    values, frame = recording(0.02, 0.04, 1.0, people=60)
+    before = found(values, frame)
+    values[:2, 80:] -= 0.4
+    assert found(values, frame).row_variance(RATE)[0] < 1.5 * before.row_variance(RATE)[0]
