@@ -11,7 +11,12 @@ The names below are the public ones; each is imported when it is first asked for
 Frames in memory: `stseg.Tracker(rig).add([boxes, image, None])`. See docs/python.md.
 """
 
-from __future__ import annotations
+import sys
+
+from stseg.import_path import leave_out_current_folder
+
+if sys.argv[:1] == ["-m"] and not {"stseg", "-mstseg"}.isdisjoint(sys.orig_argv):
+    leave_out_current_folder()  # `python -m stseg`: what is imported below comes from Python itself
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

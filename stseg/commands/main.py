@@ -18,6 +18,7 @@ from stseg.commands.terminal.standard_error import without_library_messages
 from stseg.commands.terminal.termination import INTERRUPTED, TERMINATED, Termination
 from stseg.engine.workers.garbage import collect_rarely
 from stseg.errors import ConfigError, StsegError
+from stseg.import_path import leave_out_current_folder
 from stseg.io.machine import address_space
 from stseg.io.untrusted.values import printable
 from stseg.version import __version__
@@ -61,6 +62,7 @@ def command() -> NoReturn:
                     stream.flush()
             os._exit(status)
 
+    leave_out_current_folder()
     collect_rarely()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small; its threads wait for work by spinning
     atexit.register(leave)  # the first to be registered is the last to be called

@@ -12,7 +12,7 @@ from recordings import process
 
 ROOT = Path(__file__).parents[2]
 
-FOUNDATION = ("version", "errors", "arrays", "kernels", "config", "geometry", "bodies", "records")
+FOUNDATION = ("version", "import_path", "errors", "arrays", "kernels", "config", "geometry", "bodies", "records")
 """Each may import those before it; everything below may import all of them."""
 
 SOLVER = "graphcut"

@@ -10,7 +10,7 @@ from functools import partial
 from multiprocessing.connection import Connection
 from typing import Protocol, TypeVar
 
-from stseg.engine.workers.worker_processes import CONTEXT
+from stseg.engine.workers.worker_processes import CONTEXT, started_process
 from stseg.errors import StsegError
 from stseg.kernels.accelerate import compilation_noted
 
@@ -47,8 +47,7 @@ def called_beside(
     `note` is called with lines about the work, once the result is waited for.
     """
     receiver, other = CONTEXT.Pipe(duplex=False)
-    process = CONTEXT.Process(target=_answer, args=(other, function, arguments), daemon=True)
-    process.start()
+    process = started_process(_answer, other, function, arguments)
     other.close()
 
     def result() -> _Result:

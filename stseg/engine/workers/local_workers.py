@@ -19,7 +19,7 @@ from pathlib import Path
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
-from stseg.engine.workers.worker_processes import CONTEXT
+from stseg.engine.workers.worker_processes import CONTEXT, started_process
 from stseg.errors import StsegError, WorkerError
 from stseg.io.machine import free_cores
 from stseg.kernels.accelerate import compilation_noted
@@ -164,8 +164,7 @@ def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
 def _start(job: Job, cores: int) -> _Worker:
     """Start a worker process."""
     pipe, other = CONTEXT.Pipe()
-    process = CONTEXT.Process(target=_main, args=(job, cores, other), daemon=True)
-    process.start()
+    process = started_process(_main, job, cores, other)
     other.close()
     return _Worker(process, pipe, cores)
 

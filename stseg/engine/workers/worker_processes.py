@@ -7,8 +7,11 @@ at the same time as the process of the command does.
 from __future__ import annotations
 
 import multiprocessing
+from collections.abc import Callable
+from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
 
+from stseg.import_path import SafeChildren
 from stseg.io.machine import free_cores, free_memory
 
 if TYPE_CHECKING:  # Windows has no contexts that fork
@@ -42,4 +45,13 @@ def prepare_workers(workers: int | None) -> None:
         from multiprocessing import forkserver
 
         CONTEXT.set_forkserver_preload([_PRELOADED])
-        forkserver.ensure_running()
+        with SafeChildren():
+            forkserver.ensure_running()
+
+
+def started_process(target: Callable[..., None], *arguments: object) -> BaseProcess:
+    """A further process, started; it is killed at the latest with this one."""
+    process = CONTEXT.Process(target=target, args=arguments, daemon=True)
+    with SafeChildren():
+        process.start()
+    return process
