@@ -11,10 +11,10 @@ import numpy as np
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.masks import Mask, flat_polygons, polygons
 from stseg.io.detections.record import DetectionList, Detections, Request, last_numbers, number, required_value
+from stseg.io.recording.source_files import CLASS_LISTS, class_lists
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
 
-_NAMES = ("classes.txt", "obj.names", "names.txt")
 _POSE = frozenset(5 + keypoints + after for keypoints in (34, 51) for after in (0, 1, 2))
 """Numbers in a line of a pose model: box, 17 keypoints of 2 or 3 numbers, and perhaps confidence and track id."""
 _ENTRY = re.compile(r"^\s*(?:(\d+)\s*:|-)\s*['\"]?([^'\"#]+?)['\"]?\s*(?:#.*)?$")
@@ -22,7 +22,7 @@ _ENTRY = re.compile(r"^\s*(?:(\d+)\s*:|-)\s*['\"]?([^'\"#]+?)['\"]?\s*(?:#.*)?$"
 
 def text_files(folder: Path) -> list[Path]:
     """The label files of a folder: text, but no list of class names."""
-    return sorted(path for path in folder.glob("*.txt") if path.name not in _NAMES)
+    return sorted(path for path in folder.glob("*.txt") if path.name not in CLASS_LISTS)
 
 
 def read_text_folder(request: Request) -> Detections:
@@ -92,13 +92,10 @@ def _outlined(request: Request, place: str, values: list[float]) -> tuple[tuple[
 
 def _class_names(folder: Path) -> dict[int, str]:
     """Names of classes from classes.txt or data.yaml in the folder or above it."""
-    for place in (folder, folder.parent, folder.parent.parent):
-        for name in _NAMES:
-            if (place / name).is_file():
-                return dict(enumerate(line.strip() for line in _text(place / name).splitlines() if line.strip()))
-        for path in (place / "data.yaml", place / "data.yml"):
-            if path.is_file():
-                return _yaml_names(_text(path))
+    for path in class_lists(folder):
+        if path.name not in CLASS_LISTS:
+            return _yaml_names(_text(path))
+        return dict(enumerate(line.strip() for line in _text(path).splitlines() if line.strip()))
     return {}
 
 

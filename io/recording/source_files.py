@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 from stseg.errors import SourceError
@@ -13,6 +13,8 @@ from stseg.io.recording.recording import Source
 
 _SUFFIXES = frozenset((".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"))
 _NUMBER = re.compile(r"(\d+)", re.ASCII)
+CLASS_LISTS = ("classes.txt", "obj.names", "names.txt")
+"""Lists of the names of classes beside detections in text."""
 
 
 def source_parts(source: Source, key: str) -> list[Source]:
@@ -25,9 +27,22 @@ def source_parts(source: Source, key: str) -> list[Source]:
 
 
 def source_files(source: Source) -> Iterator[Path]:
-    """Every file of a source; raises SourceError where there is none."""
+    """Every file that is read for a source, none for an address; raises SourceError where there is none."""
+    if source.address:
+        return
     for part in source_parts(source, ""):
-        yield from image_paths(part.path, "")
+        if part.path.is_dir() and is_detection_file(part.path):
+            yield from sorted(file for file in part.path.iterdir() if file.is_file())
+            yield from islice(class_lists(part.path), 1)
+        else:
+            yield from image_paths(part.path, "")
+    yield from (path for path in (source.image_list, source.appearance) if path is not None)
+
+
+def class_lists(folder: Path) -> Iterator[Path]:
+    """Files with names of classes in a folder of detections and the two above it; the first one counts."""
+    for place in (folder, folder.parent, folder.parent.parent):
+        yield from (place / name for name in (*CLASS_LISTS, "data.yaml", "data.yml") if (place / name).is_file())
 
 
 def _expanded(path: Path, kind: str, key: str) -> list[Path]:

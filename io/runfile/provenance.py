@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from hashlib import blake2b
@@ -127,32 +127,31 @@ def _checked_sources(dataset: h5py.Dataset) -> Rows:
 def run_request(recording: Recording, provenance: Provenance) -> dict[str, Any]:
     """Everything that determines the result of a run, as texts and numbers in nested tables.
 
-    Files are known by size, time of change and samples of their bytes: a time can be set back.
+    Cameras are named with their places, because the place numbers the columns of tables. Files are known by name, size,
+    time of change and samples of their bytes: a time can be set back.
     """
     rig = parse_toml(provenance.rig)
-    rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
+    rig["camera"] = {camera.pop("name"): {"place": k, **camera} for k, camera in enumerate(rig["camera"], start=1)}
     sources = {
         f"{os.fsdecode(row['camera'])}, {os.fsdecode(row['role'])}": _files_in_words(row) for row in provenance.sources
     }
-    config = parse_toml(provenance.config)
-    samples = {
-        camera.name: _samples(feed.source)
-        for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True)
-    }
     return {
-        "config": config,
+        "config": parse_toml(provenance.config),
         "rig": rig,
         "source": sources,
-        "samples of source": samples,
+        "samples of source": {f"{name}, {role}": _samples(source) for name, role, source in _streams(recording)},
         "version": dict(provenance.versions),
     }
 
 
 def _samples(source: Source) -> str:
-    """Checksum of the beginnings, middles and ends of a source's files; of many files, of some of them."""
+    """Checksum of all files' names, sizes and times, and of beginnings, middles and ends of some of them."""
     digest = blake2b(digest_size=16)
     try:
-        files = list(source_files(source)) if not source.address else []
+        files = list(source_files(source))
+        for path in files:
+            state = path.stat()
+            digest.update(os.fsencode(f"{path.name}/{state.st_size}/{state.st_mtime_ns}/"))
         for path in files[:: max(1, len(files) // _SAMPLED_FILES)]:
             with path.open("rb") as file:
                 size = file.seek(0, os.SEEK_END)
@@ -191,17 +190,21 @@ def _versions() -> dict[str, str]:
 
 
 def _sources(recording: Recording) -> Rows:
-    rows = []
-    for camera, streams in zip(recording.rig.cameras, recording.sources, strict=True):
-        roles = ((b"frames", streams.source), (b"background", streams.background), (b"images", streams.images))
-        rows += [(camera.name, role, *_described(source)) for role, source in roles if source is not None]
+    rows = [(name, role.encode(), *_described(source)) for name, role, source in _streams(recording)]
     return np.array(rows, SOURCE)
+
+
+def _streams(recording: Recording) -> Iterator[tuple[str, str, Source]]:
+    """Camera, role and source of every stream."""
+    for camera, streams in zip(recording.rig.cameras, recording.sources, strict=True):
+        roles = (("frames", streams.source), ("background", streams.background), ("images", streams.images))
+        yield from ((camera.name, role, source) for role, source in roles if source is not None)
 
 
 def _described(source: Source) -> tuple[bytes, bytes, int, int, float]:
     """kind, path, files, size, modified; zeros for streams that cannot be found."""
     try:
-        states = [path.stat() for path in source_files(source)] if not source.address else []
+        states = [path.stat() for path in source_files(source)]
     except (OSError, SourceError):
         states = []
     modified = max((state.st_mtime for state in states), default=np.nan)

@@ -1,20 +1,29 @@
 """Nothing is lost: runs that are killed, stopped, starved or tampered with go on and end as if nothing had happened."""
 
+import io
 import os
+import random
 import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from recordings import COMMAND, FRAMES, assert_same, compiled_only, process, run_words, started, track
+from hypothesis import example, given, settings
+from hypothesis.strategies import integers, sampled_from
+from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, process, run_words, started, track
 from refusals import Command
 from scenes import walkers
 
+from stseg.config import Config
 from stseg.evaluation import evaluate
+from stseg.io.config_file import format_config
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_files import checksum
 
@@ -162,6 +171,91 @@ def test_another_run_is_refused_and_the_difference_named(
     said = refusal(*run_words(rig_path, halfway, *more))
     assert re.search(rf"{reported}.*delete the folder night\.h5\.segments", said), said
     assert [path.name for path in segments_of(halfway)] == kept
+
+
+def cameras_reordered(folder: Path, chance: random.Random) -> tuple[str, ...]:
+    text = (folder / "rig.toml").read_text()
+    head, *cameras = text.split("[[camera]]")
+    chance.shuffle(cameras)
+    (folder / "rig.toml").write_text("[[camera]]".join([head, *cameras]))
+    return ()
+
+
+def rig_changed(folder: Path, chance: random.Random) -> tuple[str, ...]:
+    """Another last digit of some number: one bit of it, or a thousandfold."""
+    text = (folder / "rig.toml").read_text()
+    place = chance.choice(list(re.finditer(r"\d\b(?!:)", text))).start()
+    (folder / "rig.toml").write_text(f"{text[:place]}{(int(text[place]) + 1) % 10}{text[place + 1 :]}")
+    return ()
+
+
+def source_changed(folder: Path, chance: random.Random) -> tuple[str, ...]:
+    """One digit of a file, whose size and time stay."""
+    path = folder / f"{chance.choice(list(PLACES))}.csv"
+    content, state = bytearray(path.read_bytes()), path.stat()
+    place = chance.choice([k for k, byte in enumerate(content) if byte in b"123456789"])
+    content[place] = b"0123456789"[int(chr(content[place])) - 1]
+    path.write_bytes(content)
+    os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
+    return ()
+
+
+def sources_exchanged(folder: Path, chance: random.Random) -> tuple[str, ...]:
+    one, other = (folder / f"{name}.csv" for name in chance.sample(list(PLACES), 2))
+    one.rename(folder / "away")
+    other.rename(one)
+    (folder / "away").rename(other)
+    return ()
+
+
+def configuration_changed(_folder: Path, chance: random.Random) -> tuple[str, ...]:
+    numbers = [line.split(" ") for line in format_config(Config()).splitlines() if re.match(r"\[|\w+ = \d+\.\d", line)]
+    section, keys = "", []
+    for words in numbers:
+        section = words[0].strip("[]") if words[0].startswith("[") else section
+        keys += [f"{section}.{words[0]}={float(words[2]) * chance.choice((0.97, 1.03))!r}"] if len(words) > 2 else []
+    return ("--set", chance.choice(keys))
+
+
+CHANGES = (cameras_reordered, rig_changed, source_changed, sources_exchanged, configuration_changed)
+
+
+@settings(max_examples=20, deadline=None)
+@given(change=sampled_from(CHANGES), seed=integers(0, 10**6))
+@example(change=cameras_reordered, seed=1)
+def test_a_resumed_run_is_the_run_or_is_refused(
+    rig_path: Path, killed: Path, change: Callable[[Path, random.Random], tuple[str, ...]], seed: int
+) -> None:
+    """A random change between kill and resume: one line, or the bits of an undisturbed run of the new request."""
+    with TemporaryDirectory() as name, pytest.MonkeyPatch.context() as patch:
+        folder, printed = Path(name), io.StringIO()
+        for path in rig_path.parent.glob("*.*"):
+            shutil.copy2(path, folder)
+        shutil.copytree(f"{killed}.segments", folder / "run.h5.segments")
+        more = change(folder, random.Random(seed))
+        patch.setattr(sys, "stderr", printed)
+        if track(folder / "rig.toml", folder / "run.h5", *more):
+            assert printed.getvalue().count("\n") == 1, printed.getvalue()
+            assert len(segments_of(folder / "run.h5")) == len(segments_of(killed))
+        else:
+            assert track(folder / "rig.toml", folder / "undisturbed.h5", *more) == 0
+            assert_same(folder / "run.h5", folder / "undisturbed.h5")
+
+
+def test_a_rig_in_other_words_goes_on(rig_path: Path, undisturbed: Path, halfway: Path) -> None:
+    for path in rig_path.parent.glob("*.csv"):
+        shutil.copy2(path, halfway.parent)
+    rig = halfway.with_name("rig.toml")
+    rig.write_text(rig_path.read_text().replace("# its frame", "# another comment"))
+    assert track(rig, halfway) == 0
+    assert_same(halfway, undisturbed)
+
+
+def test_another_version_is_refused(
+    rig_path: Path, halfway: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stseg.io.runfile.provenance.__version__", "0.0")
+    assert "version.stseg: found 0.0" in refusal(*run_words(rig_path, halfway))
 
 
 def test_changed_sources_are_refused(rig_path: Path, halfway: Path, refusal: Command) -> None:
