@@ -27,6 +27,7 @@ from stseg.detection.score.scoring import CORE_MARGIN
 from stseg.detection.search.frame_search import FrameSearch
 from stseg.detection.search.restarts import better_of, has_weak_members
 from stseg.geometry import Rig
+from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.estimates import Estimates
 from stseg.noise.population_estimate import PopulationEstimate
@@ -98,6 +99,7 @@ class Detector:
         number, rate, error_rates = len(self.views), self._frame_rate, self._error_rates
         return Estimates(
             BoxNoiseEstimate(rate, error_rates),
+            BoxBiasEstimate(rate, error_rates),
             PopulationEstimate(self.body, rate, error_rates),
             RimEstimate(number, self.body, self.config, rate, error_rates),
             ViewFailures(number, self.body, rate, error_rates),
@@ -160,6 +162,7 @@ class Detector:
             explanation, is_searched = self._explained(learned, is_key, included, predicted, proposals)
         if self._has_boxes:
             learned.box_noise.learn(explanation, self.views, included)
+            learned.box_bias.learn(explanation, self.views, included)
         elif is_searched:
             learned.population.learn(explanation.people)
             learned.rims.learn(explanation.people, self.views, included)

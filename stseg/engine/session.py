@@ -103,6 +103,8 @@ class Session:
             The result of `evidence` for them, if it was called before.
         """
         evidence = self.evidence(frame_set) if evidence is None else evidence
+        sizes = [camera.size for camera in self.pipeline.rig.cameras]
+        evidence = self._estimates.box_bias.corrected(evidence, sizes)
         noise, failures = self._estimates.box_noise.noise, self._estimates.failures
         frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
         with self.watch.time("detection"):

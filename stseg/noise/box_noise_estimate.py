@@ -14,7 +14,7 @@ evidence supports them, and boxes at the border of the image, which are cut ther
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -85,14 +85,8 @@ class BoxNoiseEstimate:
     ) -> None:
         """Count one frame."""
         self.offsets.forget()
-        people = explanation.people
-        for k, (view, observation, owner) in enumerate(
-            zip(views, observations, explanation.box_assignment, strict=True)
-        ):
-            if isinstance(view, BoxView) and observation is not None and len(people):
-                trusted = people.evidence - people.view_evidence[k] >= self._config.minimum_evidence
-                box = np.flatnonzero((owner >= 0) & trusted[owner] & _whole(observation.edges, view.camera.size))
-                self._count(observation.score[box], _squares(view, people, owner[box], observation.edges[box]))
+        for k, person, edges, score in explained_boxes(explanation, views, observations, self._config):
+            self._count(score, _squares(views[k], explanation.people, person, edges))
 
     def _count(self, score: Floats, squares: Floats) -> None:
         lower, share = knots_of(score)
@@ -101,8 +95,23 @@ class BoxNoiseEstimate:
             np.add.at(self.offsets.sums, knot, self.offsets.seconds(boxes * part[:, None]))
 
 
-def _whole(edges: Floats, size: tuple[int, int]) -> Flags:
-    """Boxes that the image's border does not cut."""
+def explained_boxes(
+    explanation: Explanation,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    config: ErrorRateConfig,
+) -> Iterator[tuple[int, Ints, Floats, Floats]]:
+    """Whole boxes of people that the other views support: for each view its number, people, edges and scores."""
+    people = explanation.people
+    for k, (view, observation, owner) in enumerate(zip(views, observations, explanation.box_assignment, strict=True)):
+        if isinstance(view, BoxView) and observation is not None and len(people):
+            trusted = people.evidence - people.view_evidence[k] >= config.minimum_evidence
+            box = np.flatnonzero((owner >= 0) & trusted[owner] & whole_boxes(observation.edges, view.camera.size))
+            yield k, owner[box], observation.edges[box], observation.score[box]
+
+
+def whole_boxes(edges: Floats, size: tuple[int, int]) -> Flags:
+    """Boxes float64 (n, 4) of edges that the border of an image (width, height) does not cut."""
     return np.asarray((edges[:, :2] > 0).all(1) & (edges[:, 2:] < np.array(size) - 1).all(1))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate
@@ -16,8 +17,8 @@ class Estimates:
 
     Attributes
     ----------
-    box_noise
-        Noise of detectors' boxes.
+    box_noise, box_bias
+        Noise of detectors' boxes, and the mean error of their lower edges.
     population
         Sizes of people.
     rims
@@ -27,6 +28,7 @@ class Estimates:
     """
 
     box_noise: BoxNoiseEstimate
+    box_bias: BoxBiasEstimate
     population: PopulationEstimate
     rims: RimEstimate
     failures: ViewFailures

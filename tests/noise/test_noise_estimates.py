@@ -34,6 +34,7 @@ from stseg.errors import ConfigError, RigError
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig
+from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate, without_rim
@@ -102,6 +103,27 @@ def test_the_spread_of_boxes_is_found(spread: float) -> None:
     found, true = np.delete(learned[-1], WIDTH_OFFSET), np.minimum(spread, loosest)
     assert ((found > 0.8 * true) & (found < 2.2 * true)).all()
     np.testing.assert_allclose(learned[:-2], PRIOR_NOISE.spread[:-2])
+
+
+@pytest.mark.parametrize("bias", [-0.05, 0.0, 0.05])
+def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
+    cameras = corner_cameras()
+    frame_pass, estimate = Detector(rig_of(cameras), ["boxes"] * 4, FEW_HEIGHTS, BODY), BoxBiasEstimate(RATE, CONFIG)
+    standing, sizes = people((-0.5, 0.3, 1.7), (0.5, -0.4, 1.7)), [camera.size for camera in cameras]
+    bodies = [view.table.boxes_of(*standing_of(standing)) for view in frame_pass.views]
+    lower = [body[:, 3] - bias * (body[:, 3] - body[:, 1] + EDGE_GRAIN[LOWER_EDGE_BELOW]) for body in bodies]
+    delivered = [boxes_of_edges(np.column_stack([body[:, :3], edge])) for body, edge in zip(bodies, lower, strict=True)]
+    for _ in range(25):
+        corrected = estimate.corrected(delivered, sizes)
+        estimate.learn(frame_pass.explain(corrected, None), frame_pass.views, frame_pass.observe(corrected))
+    assert estimate.bias == pytest.approx(bias, abs=0.015)
+    ends = [boxes for boxes in estimate.corrected(delivered, sizes) if isinstance(boxes, Boxes)]
+    feet = [boxes.pixel[:, 1] + boxes.pixel[:, 3] for boxes in ends]
+    assert max(np.abs(foot - body[:, 3]).max() for foot, body in zip(feet, bodies, strict=True)) < 2.0
+
+
+def boxes_of_edges(edges: Floats) -> Boxes:
+    return Boxes(np.column_stack([edges[:, :2], edges[:, 2:] - edges[:, :2]]), np.ones(len(edges)))
 
 
 def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
