@@ -21,7 +21,7 @@ from stseg.detection.explanation import explained_frame
 from stseg.detection.prior import Prior
 from stseg.detection.score.set_state import set_state
 from stseg.detection.search.best_set import ENUMERATION_LIMIT
-from stseg.detection.search.groups import fill_groups, fill_interactions
+from stseg.detection.search.groups import fill_groups, mark_interacting
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.merge_moves import merged
 from stseg.detection.search.refined_people import refined_members
@@ -76,7 +76,8 @@ def test_groups_interact_within_and_their_scores_add_up(seed: int) -> None:
     frame = in_rooms(random_frame(seed, 9, 2), 3)
     problem = frame.problem()
     interacts, group = np.empty((9, 9), bool), np.empty(9, np.int64)
-    fill_interactions(set_state(problem), interacts)
+    for i, linked in enumerate(interacts):
+        mark_interacting(i, set_state(problem), linked)
     expected = [[i == j or reference.interact(i, j, problem) for j in range(9)] for i in range(9)]
     np.testing.assert_array_equal(interacts, expected)
     number = fill_groups(set_state(problem), group)

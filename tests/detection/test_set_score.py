@@ -5,26 +5,30 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import reference_core as reference
-from crafted_frames import PARAMETERS, hiders_of_cover, in_rooms, random_frame, scaled, two_births
+from crafted_frames import PARAMETERS, CraftedFrame, hiders_of_cover, in_rooms, random_frame, scaled, two_births
 from reference_core import best_pairs
 from scipy.optimize import linear_sum_assignment
 
+from stseg.arrays import Floats
 from stseg.bodies.outlines import paint_outlines
 from stseg.detection.problem import BoxEvidence, PixelEvidence
-from stseg.detection.score.box_state import clear_cache
-from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_scores, pixel_score, set_score
+from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_score, pixel_score, set_score
 from stseg.detection.score.set_state import (
+    Kept,
     SetState,
     add,
-    assign_pixels_and_tracks,
-    changed,
+    fill_gains,
     gain,
     put,
     release,
+    remove,
+    return_to,
     set_state,
     withdraw,
 )
-from stseg.detection.score.track_state import assign_track, track_gain, track_state
+from stseg.detection.score.track_state import assign_track, release_track, track_gain, track_state
+from stseg.kernels.accelerate import kernel
+from stseg.kernels.pointed_tuples import pointed
 
 
 @pytest.mark.parametrize("tracks", [0, 3])
@@ -39,19 +43,30 @@ def test_score_by_definition(seed: int, tracks: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_sets_are_scored_as_each_by_itself(seed: int) -> None:
-    frame = scaled(random_frame(seed, 6, 3))
-    sets = np.array([[0, 1, 2], [5, 3, 0], [4, 2, 5]])
-    totals, evidence, tracks = np.empty(3), np.empty((3, 4, 3)), np.empty((3, 3), np.int64)
-    fill_set_scores(sets, frame.problem(), totals, evidence, tracks)
-    for s, members in enumerate(sets):
-        problem = frame.problem()
-        assert totals[s] == set_score(members, 3, problem)
-        np.testing.assert_array_equal(evidence[s], problem.view_evidence[:, :3])
-        gains = frame.birth_cost[members, None] + frame.track_gain[members]
-        pairs = [(a, track) for a, track in enumerate(tracks[s]) if track >= 0]
-        best = sum(gains[pair] for pair in best_pairs(gains))
-        assert sum(gains[pair] for pair in pairs) == pytest.approx(best)
+def test_a_score_has_its_evidence_and_tracks(seed: int) -> None:
+    frame, members = scaled(random_frame(seed, 6, 3)), np.array([5, 3, 0])
+    evidence, tracks, problem = np.empty((4, 3)), np.empty(3, np.int64), frame.problem()
+    assert fill_set_score(members, frame.problem(), evidence, tracks) == set_score(members, 3, problem)
+    np.testing.assert_array_equal(evidence, problem.view_evidence[:, :3])
+    gains = frame.birth_cost[members, None] + frame.track_gain[members]
+    pairs = [(a, track) for a, track in enumerate(tracks) if track >= 0]
+    assert sum(gains[pair] for pair in pairs) == pytest.approx(sum(gains[pair] for pair in best_pairs(gains)))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_candidates_add_what_larger_sets_score_more(seed: int) -> None:
+    frame, members, candidates = scaled(random_frame(seed, 8, 3)), np.array([5, 3, 0]), np.arange(8)
+    gains, evidence, tracks = np.empty(8), np.empty((4, 8)), np.empty(8, np.int64)
+    fill_gains(members, candidates, frame.problem(), gains, evidence, tracks)
+    for i in candidates:
+        others = members[members != i]
+        larger, before = np.append(others, i), frame.score(others)
+        assert gains[i] == pytest.approx(frame.score(larger) - before, abs=1e-9)
+        if i not in members:
+            expected, expected_tracks = np.empty((4, 4)), np.empty(4, np.int64)
+            fill_set_score(larger, frame.problem(), expected, expected_tracks)
+            np.testing.assert_allclose(evidence[:, i], expected[:, -1], atol=1e-12)
+            assert tracks[i] == expected_tracks[-1]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -124,35 +139,78 @@ def assert_nearest_own_pixels(state: SetState) -> None:
         np.testing.assert_array_equal(owner, nearest)
 
 
+@kernel
+def move(i: int, place: int, whole: SetState) -> None:
+    """Remove candidate i if it is a member, else add it at a place."""
+    state = pointed(whole)
+    if not state.inside[i]:
+        add(i, place, state)
+        return
+    for a in range(state.size[0] - 1, -1, -1):
+        if state.members[a] == i:
+            remove(a, state)
+
+
+@kernel
+def fill_all_gains(place: int, whole: SetState, gains: Floats) -> None:
+    """Fill gains (candidate,); those of candidates outside alone while the member at a place is absent, -1 for none."""
+    state = pointed(whole)
+    absent = withdraw(place, state) if place >= 0 else -1
+    for i in range(len(gains)):
+        if absent < 0 or not (state.inside[i] or i == absent):
+            gains[i] = gain(i, absent, state)
+    if absent >= 0:
+        put(absent, place, state)
+
+
+def gains_by_score(frame: CraftedFrame, members: list[int]) -> Floats:
+    """Gain of each candidate outside a set, and what each member is worth, nats."""
+    others = [[j for j in members if j != i] for i in range(len(frame.birth_cost))]
+    return np.array([frame.score([*rest, i]) - frame.score(rest) for i, rest in enumerate(others)])
+
+
+def assert_kept_gains(state: SetState, frame: CraftedFrame) -> int:
+    """Assert that gains that are kept are those of a fresh state, and these of the plain score; returns how many."""
+    members, kept = state.members[: state.size[0]].tolist(), state.is_known.copy()
+    fresh, gains = set_state(frame.problem()), np.empty(len(state.inside))
+    for a, j in enumerate(members):
+        move(j, a, fresh)
+    fill_all_gains(-1, fresh, gains)
+    np.testing.assert_allclose(gains, gains_by_score(frame, members), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(state.gains[kept], fresh.gains[kept], rtol=0, atol=1e-9)
+    return int(kept.sum())
+
+
 @pytest.mark.parametrize("tracks", [0, 3])
 @pytest.mark.parametrize("seed", range(20))
 def test_gains_are_differences_of_scores(seed: int, tracks: int) -> None:
-    """Members come and go: each gain is that of the plain score, cached or not, and for a member that is put back."""
+    """Members come and go, one in place of another, and back: the gains that are kept are those of the plain score."""
     frame = scaled(in_rooms(random_frame(seed, 8, tracks), 4) if seed % 2 else random_frame(seed, 8, tracks))
-    state, rng, cached = set_state(frame.problem()), np.random.default_rng(seed), 0
-    clear_cache(state.boxes)
-    assign_pixels_and_tracks(state)
-    for moved in rng.integers(0, 8, 14).tolist():
-        cached += int(state.boxes.is_cached.sum())
-        if state.inside[moved]:
-            withdraw(int(np.flatnonzero(state.members[: state.size[0]] == moved)[0]), state)
-            changed(moved, state)
-        else:
-            add(moved, state)
-        members = state.members[: state.size[0]].copy()
-        assert sorted(members.tolist()) == np.flatnonzero(state.inside).tolist()
+    state, rng, kept, gains = set_state(frame.problem()), np.random.default_rng(seed), 0, np.empty(8)
+    for k, moved in enumerate(rng.integers(0, 8, 20).tolist()):
+        if k % 5 == 0:
+            before = Kept(state.kept.numbers.copy(), state.kept.values.copy(), state.kept.flags.copy())
+            score = frame.score(state.members[: state.size[0]])
+        move(moved, int(rng.integers(0, state.size[0] + 1)), state)
+        members = state.members[: state.size[0]].tolist()
+        assert sorted(members) == np.flatnonzero(state.inside).tolist()
         assert_nearest_own_pixels(state)
-        score = frame.score(members)
-        for i in np.flatnonzero(~state.inside).tolist():
-            expected = pytest.approx(frame.score([*members, i]) - score, abs=1e-9)
-            assert gain(i, state, True) == expected
-            assert gain(i, state, False) == expected
-        for place, i in enumerate(members.tolist()):
-            assert withdraw(place, state) == i
-            assert gain(i, state, True) == pytest.approx(score - frame.score(np.delete(members, place)), abs=1e-9)
-            put(i, place, state)
-            np.testing.assert_array_equal(state.members[: len(members)], members)
-    assert cached > 0
+        assert state.total[0] == pytest.approx(frame.score(members) - frame.score([]), abs=1e-9)
+        kept += assert_kept_gains(state, frame)
+        fill_all_gains(-1, state, gains)
+        np.testing.assert_allclose(gains, gains_by_score(frame, members), rtol=0, atol=1e-9)
+        for place, absent in enumerate(members):
+            fill_all_gains(place, state, gains)
+            outside = ~state.inside
+            expected = gains_by_score(frame, [j for j in members if j != absent])
+            np.testing.assert_allclose(gains[outside], expected[outside], rtol=0, atol=1e-9)
+            assert state.members[: len(members)].tolist() == members
+        if k % 5 == 4:
+            return_to(before, state)
+            assert frame.score(state.members[: state.size[0]]) == score
+            assert_nearest_own_pixels(state)
+            kept += assert_kept_gains(state, frame)
+    assert kept > 0
     release(state)
     assert (state.problem.owner == -1).all()
 
@@ -170,4 +228,14 @@ def test_tracks_assigned_one_by_one_have_the_greatest_sum(seed: int) -> None:
         assert added == pytest.approx(sums[-1] - sums[-2], abs=1e-9)
         assigned = np.flatnonzero(state.member_of >= 0)
         assert positive[state.member_of[assigned], assigned].sum() == pytest.approx(sums[-1], abs=1e-9)
+        assert len(set(state.member_of[assigned].tolist())) == len(assigned)
+    inside = np.ones(7, bool)
+    for i in rng.permutation(7).tolist():
+        inside[i] = False
+        release_track(i, inside, state)
+        assigned = np.flatnonzero(state.member_of >= 0)
+        best = positive[inside][linear_sum_assignment(-positive[inside])].sum()
+        assert inside[state.member_of[assigned]].all()
+        assert positive[state.member_of[assigned], assigned].sum() == pytest.approx(best, abs=1e-9)
+        assert state.member_gain[assigned].sum() == pytest.approx(best, abs=1e-9)
         assert len(set(state.member_of[assigned].tolist())) == len(assigned)

@@ -17,12 +17,13 @@ from stseg.kernels.accelerate import kernel, part
 
 
 class BoxPairs(NamedTuple):
-    """Scratch for the assignment of boxes: pairs of a member and a box, and members and boxes with a pair."""
+    """Scratch for the assignment of boxes: pairs of a member and a box, and boxes with a pair."""
 
     gain: Floats
     member: Ints
     box: Ints
-    has_box: Flags
+    own_gain: Floats
+    """float64 (candidate,): the gain of the box that each of the last linked members is assigned, 0 for none, nats."""
     has_member: Flags
 
 
@@ -45,12 +46,6 @@ class BoxState(NamedTuple):
     """float64 (view * candidate,): share of the candidate's pillar inside the image."""
     missing_cost: Floats
     """float64 (view * candidate,): cost of a missing box of a candidate that no member hides, nats."""
-    is_cached: Flags
-    """bool (view * candidate,): whether the view's score of the candidate's linked members is cached."""
-    before: Floats
-    """float64 (view * candidate,): that score without the candidate, nats."""
-    after: Floats
-    """float64 (view * candidate,): that score with the candidate, nats."""
     linked: Ints
     """int64 (candidate + 1,): scratch, as are `is_linked` and `pairs`."""
     is_linked: Flags
@@ -60,7 +55,7 @@ class BoxState(NamedTuple):
 
 @kernel
 def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
-    """The links of all candidates, with nothing cached."""
+    """The links of all candidates."""
     views, candidates, boxes = evidence.match.shape
     threshold = np.log(parameters.box_miss_rate) - parameters.box_log_ratio
     fit, fitted = np.zeros(views * candidates, np.int64), np.zeros(views * boxes, np.int64)
@@ -84,12 +79,11 @@ def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
     most = len(fits.item) + 1
     pairs = BoxPairs(
         np.empty(most), np.empty(most, np.int64), np.empty(most, np.int64),
-        np.zeros(candidates, np.bool_), np.zeros(boxes, np.bool_),
+        np.zeros(candidates), np.zeros(boxes, np.bool_),
     )  # fmt: skip
     return BoxState(
         views, boxes, fits, fitting, _hidden_by(evidence.hiders, views, candidates), evidence.hiders,
-        evidence.inside.copy().reshape(-1), missing_cost, np.zeros(views * candidates, np.bool_),
-        np.empty(views * candidates), np.empty(views * candidates), np.empty(candidates + 1, np.int64),
+        evidence.inside.copy().reshape(-1), missing_cost, np.empty(candidates + 1, np.int64),
         np.zeros(candidates, np.bool_), pairs,
     )  # fmt: skip
 
@@ -110,64 +104,27 @@ def _hidden_by(hiders: RaggedArray, views: int, candidates: int) -> RaggedArray:
 
 
 @part
-def box_gain(i: int, inside: Flags, state: BoxState, parameters: ScoreParameters, use_cache: bool) -> float:
-    """Change of the box score of all views when candidate i joins the set, inside (candidate,), without i: nats."""
-    total, candidates = 0.0, len(state.is_linked)
-    for view in range(state.views):
-        row = view * candidates + i
-        if use_cache and state.is_cached[row]:
-            before, after = state.before[row], state.after[row]
-        else:
-            before, after = _linked_scores(view, i, inside, state, parameters)
-            if use_cache:
-                state.before[row], state.after[row], state.is_cached[row] = before, after, True
-        total -= before
-        total += after
-    return total
-
-
-@part
-def clear_cache(state: BoxState) -> None:
-    """Clear all cached scores."""
-    for row in range(len(state.is_cached)):
-        state.is_cached[row] = False
-
-
-@part
-def clear_dependents(i: int, inside: Flags, state: BoxState) -> None:
-    """Clear the cached scores that depend on whether candidate i is in the set, inside (candidate,), without i.
-
-    Those are the scores of all who fit the boxes, or hide a part, of i and of the members that i is linked to, and of
-    those that i hides.
-    """
-    candidates, fits, fitting, hiders = len(state.is_linked), state.fits, state.fitting, state.hiders
-    for view in range(state.views):
-        first = view * candidates
-        for k in range(state.hidden.start[first + i], state.hidden.start[first + i + 1]):
-            state.is_cached[first + state.hidden.item[k]] = False
-        for a in range(_link(view, i, inside, state)):
-            row = first + state.linked[a]
-            for k in range(hiders.start[row], hiders.start[row + 1]):
-                state.is_cached[first + hiders.item[k]] = False
-            for k in range(fits.start[row], fits.start[row + 1]):
-                box = view * state.boxes + fits.item[k]
-                for m in range(fitting.start[box], fitting.start[box + 1]):
-                    state.is_cached[first + fitting.item[m]] = False
-
-
-@part
-def _linked_scores(
-    view: int, i: int, inside: Flags, state: BoxState, parameters: ScoreParameters
-) -> tuple[float, float]:
-    """A view's score of the members linked to candidate i, without and with i, nats."""
-    number = _link(view, i, inside, state)
+def box_gain(view: int, i: int, inside: Flags, state: BoxState, parameters: ScoreParameters) -> float:
+    """Change of a view's box score when candidate i joins the set, inside (candidate,), without i: nats."""
+    number = link(view, i, inside, state)
     if number == 1:
-        return 0.0, _score_alone(view * len(state.is_linked) + i, inside, state, parameters)
+        return _score_alone(view * len(state.is_linked) + i, inside, state, parameters)
     before = _score_of_linked(view, 1, number, inside, state, parameters)
     inside[i] = True
     after = _score_of_linked(view, 0, number, inside, state, parameters)
     inside[i] = False
-    return before, after
+    return after - before
+
+
+@part
+def box_part(view: int, i: int, inside: Flags, state: BoxState, parameters: ScoreParameters) -> float:
+    """A view's evidence for candidate i as a further member of the set, inside (candidate,): nats."""
+    number = link(view, i, inside, state)
+    inside[i] = True
+    _score_of_linked(view, 0, number, inside, state, parameters)
+    inside[i] = False
+    row = view * len(state.is_linked) + i
+    return _missing_cost(row, inside, state, parameters) + float(state.pairs.own_gain[i])
 
 
 @part
@@ -180,7 +137,7 @@ def _score_alone(row: int, inside: Flags, state: BoxState, parameters: ScorePara
 
 
 @part
-def _link(view: int, i: int, inside: Flags, state: BoxState) -> int:
+def link(view: int, i: int, inside: Flags, state: BoxState) -> int:
     """Fill `state.linked` with i and the members with parts of the score that may depend on i; returns their number."""
     linked, is_linked, candidates = state.linked, state.is_linked, len(state.is_linked)
     fits, fitting, hidden = state.fits, state.fitting, state.hidden
@@ -217,6 +174,7 @@ def _score_of_linked(
         row = view * candidates + state.linked[a]
         missing = _missing_cost(row, inside, state, parameters)
         total += missing
+        pairs.own_gain[state.linked[a]] = 0.0
         for k in range(fits.start[row], fits.start[row + 1]):
             if fits.value[k] > missing:
                 pairs.gain[count], pairs.member[count] = fits.value[k] - missing, state.linked[a]
@@ -243,12 +201,12 @@ def _assigned_gain(count: int, pairs: BoxPairs) -> float:
     while True:
         best, gain = -1, 0.0
         for k in range(count):
-            if pairs.gain[k] > gain and not pairs.has_box[pairs.member[k]] and not pairs.has_member[pairs.box[k]]:
+            if pairs.gain[k] > gain and pairs.own_gain[pairs.member[k]] == 0 and not pairs.has_member[pairs.box[k]]:
                 best, gain = k, pairs.gain[k]
         if best < 0:
             break
-        pairs.has_box[pairs.member[best]] = pairs.has_member[pairs.box[best]] = True
+        pairs.own_gain[pairs.member[best]], pairs.has_member[pairs.box[best]] = gain, True
         total += gain
     for k in range(count):
-        pairs.has_box[pairs.member[k]] = pairs.has_member[pairs.box[k]] = False
+        pairs.has_member[pairs.box[k]] = False
     return total

@@ -59,23 +59,22 @@ def set_score(members: Ints, count: int, problem: DetectionProblem) -> float:
 
 
 @kernel
-def fill_set_scores(sets: Ints, whole: DetectionProblem, totals: Floats, view_evidence: Floats, tracks: Ints) -> None:
-    """Score some sets int64 (set, member) of as many candidates each of the problem `whole`.
+def fill_set_score(members: Ints, whole: DetectionProblem, view_evidence: Floats, tracks: Ints) -> float:
+    """Score of a set of candidates, int64 (member,), nats.
 
-    Filled are `totals` float64 (set,) with the scores, nats; `view_evidence` float64 (set, view, member) with the
-    evidence of each view for each member, nats, views with boxes first; and `tracks` int64 (set, member) with the
-    predicted track that each member continues, -1 for none.
+    Filled are `view_evidence` float64 (view, member) with the evidence of each view for each member, nats, views with
+    boxes first; and `tracks` int64 (member,) with the predicted track that each member continues, -1 for none.
     """
-    problem, count = pointed(whole), sets.shape[1]
-    for s in range(len(sets)):
-        totals[s] = set_score(sets[s], count, problem)
-        for view in range(view_evidence.shape[1]):
-            for a in range(count):
-                view_evidence[s, view, a] = problem.view_evidence[view, a]
-        tracks[s] = -1
-        for track in range(problem.track_gain.shape[1]):
-            if problem.track_member[track] >= 0:
-                tracks[s, problem.track_member[track]] = track
+    problem, count = pointed(whole), len(members)
+    total = set_score(members, count, problem)
+    for view in range(len(view_evidence)):
+        for a in range(count):
+            view_evidence[view, a] = problem.view_evidence[view, a]
+    tracks[:] = -1
+    for track in range(problem.track_gain.shape[1]):
+        if problem.track_member[track] >= 0:
+            tracks[problem.track_member[track]] = track
+    return total
 
 
 @kernel

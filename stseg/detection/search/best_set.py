@@ -13,8 +13,8 @@ import numpy as np
 from stseg.arrays import Ints
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.scoring import set_score
-from stseg.detection.score.set_state import SetState, set_state
-from stseg.detection.search.groups import fill_groups, fill_interactions, restricted
+from stseg.detection.score.set_state import SetState, put, release, set_state
+from stseg.detection.search.groups import fill_groups, restricted
 from stseg.detection.search.local_search import SCORE_TOLERANCE, local_search, swap_moves
 from stseg.kernels.accelerate import kernel
 from stseg.kernels.pointed_tuples import pointed
@@ -40,23 +40,20 @@ def find_best_set(
 def _improve(members: Ints, count: int, whole: SetState, enumeration_limit: int, swap_sweeps: int) -> int:
     """The search, group by group; the state's set is that of one group after the other."""
     state, candidates = pointed(whole), len(whole.inside)
-    compared = candidates if swap_sweeps > 0 else 0  # swap moves alone ask which candidates interact
-    interacts, group_of = np.empty((compared, compared), np.bool_), np.empty(candidates, np.int64)
-    if swap_sweeps > 0:
-        fill_interactions(state, interacts)
+    group_of = np.empty(candidates, np.int64)
     state.inside[members[:count]] = True
     for g in range(fill_groups(state, group_of)):
         group = np.flatnonzero(group_of == g)
         if len(group) <= enumeration_limit:
             state.size[0] = _best_of_all_subsets(state.members, group, restricted(whole.problem, group))
         else:
-            start = group[state.inside[group]]
-            state.size[0] = len(start)
-            for a in range(len(start)):
-                state.members[a] = start[a]
-            local_search(group, state)
+            start, state.size[0] = group[state.inside[group]], 0
+            for i in start:
+                put(i, state.size[0], state)
+            local_search(group, group_of == g, state)
             if swap_sweeps > 0:
-                swap_moves(group, interacts, swap_sweeps, state)
+                swap_moves(group, swap_sweeps, state)
+            release(state)
         state.inside[group] = False
         state.inside[state.members[: state.size[0]]] = True
     best = np.flatnonzero(state.inside)

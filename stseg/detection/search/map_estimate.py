@@ -17,7 +17,8 @@ from stseg.bodies.views import BoxView, PixelView
 from stseg.detection.evidence.candidate_evidence import ProjectedBodies
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.detection.problem import DetectionProblem
-from stseg.detection.score.scoring import fill_box_assignment, fill_set_scores
+from stseg.detection.score.scoring import fill_box_assignment, fill_set_score
+from stseg.detection.score.set_state import fill_gains
 from stseg.detection.search.best_set import find_best_set
 from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
@@ -37,7 +38,7 @@ class SetScore:
 
 @dataclass(frozen=True)
 class Additions:
-    """Candidates outside a set, each as a further member."""
+    """Candidates, each as a further member of a set."""
 
     gain: Floats
     """float64 (m,): change of the score, nats."""
@@ -95,36 +96,30 @@ class MapEstimate:
         """Search the best set among more candidates, from the candidates `start` int64 (n,) on."""
         return self.with_more(more).with_members(start)._searched()
 
-    def score(self, members: Ints) -> SetScore:
-        """Score of any set of the candidates, int64 (n,)."""
-        totals, view_evidence, tracks = self._scores(members[None])
-        return SetScore(float(totals[0]), view_evidence[0], tracks[0])
-
     @cached_property
     def members_score(self) -> SetScore:
         """Score of the members."""
-        return self.score(self.members)
+        count = len(self.members)
+        view_evidence, tracks = np.empty((len(self.evidence.views), count)), np.empty(count, np.int64)
+        total = fill_set_score(self.members, self.problem, view_evidence, tracks)
+        return SetScore(total, self._of_views(view_evidence), tracks)
 
     @property
     def track_index(self) -> Ints:
         """The predicted track that each member continues, int64 (member,); -1 for births."""
         return self.members_score.track_index
 
-    def additions(self, others: Ints) -> Additions:
-        """Score of the set with each of some candidates outside it, int64 (m,), as a further member."""
-        sets = np.column_stack([np.tile(self.members, (len(others), 1)), others])
-        totals, view_evidence, tracks = self._scores(sets)
-        return Additions(totals - self.members_score.total, view_evidence[..., -1].T, tracks[:, -1])
+    def additions(self, candidates: Ints) -> Additions:
+        """Gains of some candidates, int64 (m,), each by itself; of members, what they are worth, and that alone."""
+        gains, tracks = np.empty(len(candidates)), np.empty(len(candidates), np.int64)
+        view_evidence = np.zeros((len(self.evidence.views), len(candidates)))
+        fill_gains(self.members, candidates, self.problem, gains, view_evidence, tracks)
+        return Additions(gains, self._of_views(view_evidence), tracks)
 
-    def _scores(self, sets: Ints) -> tuple[Floats, Floats, Ints]:
-        """The fields of `SetScore`, of sets (set, member) of candidates, with the set before the other axes."""
-        number, count = sets.shape
-        totals, tracks = np.empty(number), np.empty((number, count), np.int64)
-        view_evidence = np.empty((number, len(self.evidence.views), count))
-        fill_set_scores(sets, self.problem, totals, view_evidence, tracks)
-        # The problem's evidence has the views with boxes first.
+    def _of_views(self, view_evidence: Floats) -> Floats:
+        """The problem's evidence, which has the views with boxes first, in the order of the views."""
         pixels_last = np.argsort([isinstance(view, PixelView) for view in self.evidence.views], kind="stable")
-        return totals, view_evidence[:, np.argsort(pixels_last)], tracks
+        return view_evidence[np.argsort(pixels_last)]
 
     @cached_property
     def others(self) -> Ints:
@@ -141,9 +136,7 @@ class MapEstimate:
     @cached_property
     def losses(self) -> Floats:
         """Loss of score without each member, nats, float64 (n,)."""
-        count = len(self.members)
-        others = np.tile(self.members, (count, 1))[~np.eye(count, dtype=bool)].reshape(count, max(count - 1, 0))
-        return self.members_score.total - self._scores(others)[0]
+        return self.additions(self.members).gain
 
     def alternatives(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
