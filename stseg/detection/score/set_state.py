@@ -33,7 +33,7 @@ REPLACEMENT_DISTANCE = 0.7
 
 
 class Kept(NamedTuple):
-    """What is known of a set: a copy of it is what the set returns to when moves are taken back (`return_to`)."""
+    """All that is known of a set: to a copy of it the set returns when moves are taken back (`return_to`)."""
 
     numbers: Ints
     values: Floats
@@ -166,7 +166,7 @@ def _overlapping(pixels: PixelEvidence) -> RaggedArray:
 
 @kernel
 def copy_of(state: SetState) -> Kept:
-    """What is known of a set now."""
+    """All that is known of a set now."""
     return Kept(state.kept.numbers.copy(), state.kept.values.copy(), state.kept.flags.copy())
 
 
