@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
-from stseg.errors import FormatError, OutputError
+from stseg.errors import FormatError
+from stseg.io.outputs.whole_files import replacing, require_output
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.values import abbreviated, parse_number
@@ -63,14 +64,14 @@ def read_tracks_csv(path: Path) -> Rows:
     return table
 
 
-def write_tracks_csv(path: Path, trajectory: Rows) -> None:
+def write_tracks_csv(path: Path, trajectory: Rows, overwrite: bool = False) -> None:
     """Write a TRAJECTORY table as frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm."""
-    _write(path, trajectory, _WRITTEN)
+    _write(path, trajectory, _WRITTEN, overwrite)
 
 
-def write_truth_csv(path: Path, truth: Rows) -> None:
+def write_truth_csv(path: Path, truth: Rows, overwrite: bool = False) -> None:
     """Write a POSITION table as frame, id, x, y, flag; positions to 0.1 mm."""
-    _write(path, truth, {name: _WRITTEN.get(name, "%d") for name in (*_NEEDED, "flag")})
+    _write(path, truth, {name: _WRITTEN.get(name, "%d") for name in (*_NEEDED, "flag")}, overwrite)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,11 +166,10 @@ def _repeats(table: Rows) -> Flags:
     return repeats
 
 
-def _write(path: Path, table: Rows, columns: dict[str, str]) -> None:
+def _write(path: Path, table: Rows, columns: dict[str, str], overwrite: bool) -> None:
     """Write the columns, each in its format."""
-    try:
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            file.write(",".join(columns) + "\n")
-            np.savetxt(file, table[list(columns)], fmt=",".join(columns.values()))
-    except OSError as error:
-        raise OutputError(path, "", error.strerror or error, "a place that can be written") from error
+    header = ",".join(columns) + "\n"
+    require_output(Path(path), overwrite, table=header)
+    with replacing(Path(path), overwrite) as part, part.open("w", newline="", encoding="utf-8") as file:
+        file.write(header)
+        np.savetxt(file, table[list(columns)], fmt=",".join(columns.values()))

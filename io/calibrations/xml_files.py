@@ -22,13 +22,14 @@ from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.geometry import Lens
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
-from stseg.io.outputs.whole_files import write_file
+from stseg.io.outputs.whole_files import MARK, write_file
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_xml
 from stseg.io.untrusted.values import parse_numbers, printable
 
 _MATRIX = ("camera_matrix",)
 _DISTORTION = ("distortion_coefficients",)
+_HEAD = f'<?xml version="1.0"?>\n<!-- {MARK.decode()} -->\n'
 _ROTATION = ("rotation_vectors", "rvec")
 _TRANSLATION = ("translation_vectors", "tvec")
 _BEFORE_TURN = 0.9
@@ -71,7 +72,7 @@ def write_opencv_lens(path: Path, matrix: Floats, distortion: Floats, overwrite:
         f"  <dt>d</dt>\n  <data>{' '.join(map(repr, rows.ravel().tolist()))}</data>\n</{name}>"
         for name, rows in ((_MATRIX[0], matrix), (_DISTORTION[0], distortion.reshape(-1, 1)))
     )
-    write_file(path, f'<?xml version="1.0"?>\n<opencv_storage>\n{nodes}\n</opencv_storage>\n'.encode(), overwrite)
+    write_file(path, f"{_HEAD}<opencv_storage>\n{nodes}\n</opencv_storage>\n".encode(), overwrite)
 
 
 def _numbers(

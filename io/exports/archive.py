@@ -12,6 +12,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.io.extras import load_extra
+from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile.reading.run_reader import Run
 from stseg.io.untrusted.values import printable, require_utf8
 
@@ -38,7 +39,8 @@ def write_sqlite(path: Path, runs: Sequence[Run]) -> None:
     connection = sqlite3.connect(path)
     try:
         with connection:
-            _fill(connection, runs)
+            rows = _fill(connection, runs)
+        _require_rows(connection, rows)
     except sqlite3.Error as error:
         raise OSError(errno.EIO, str(error)) from error
     finally:
@@ -50,29 +52,47 @@ def write_duckdb(path: Path, runs: Sequence[Run]) -> None:
     duckdb = load_extra("duckdb", "duckdb")
     require_utf8(path, "DuckDB")
     path.unlink(missing_ok=True)
+    log = path.with_name(f"{path.name}.wal")
     try:
         with duckdb.connect(str(path)) as connection:
             connection.execute("BEGIN")
-            _fill(connection, runs)
+            rows = _fill(connection, runs)
+            connection.execute(f"COMMENT ON TABLE recordings IS '{MARK.decode()}'")
             connection.execute("COMMIT")
+            connection.execute("CHECKPOINT")
+        log.unlink(missing_ok=True)  # on a full disk the rows may be in it alone, and closing says nothing
+        with duckdb.connect(str(path), read_only=True) as connection:
+            _require_rows(connection, rows)
     except duckdb.Error as error:
-        raise OSError(errno.EIO, str(error)) from error
+        raise OSError(errno.EIO, str(error).partition("\n")[0]) from error
     finally:
-        path.with_name(f"{path.name}.wal").unlink(missing_ok=True)
+        log.unlink(missing_ok=True)
 
 
 ARCHIVES: Mapping[str, Callable[[Path, Sequence[Run]], None]] = {"sqlite": write_sqlite, "duckdb": write_duckdb}
 """By the name that `stseg export --to` takes."""
 
 
-def _fill(connection: Any, runs: Sequence[Run]) -> None:
+def _fill(connection: Any, runs: Sequence[Run]) -> dict[str, int]:
+    """Make and fill the tables; the number of rows of each."""
+    counts = dict.fromkeys(_TABLES, 0)
     for table, columns in _TABLES.items():
-        connection.execute(f"CREATE TABLE {table} ({columns})")
+        connection.execute(f"CREATE TABLE {table} ({columns} /* {MARK.decode()} */)")
     for run in runs:
         for table, rows in _rows(run):
             places = ", ".join("?" * len(_TABLES[table].split(",")))
             if values := list(rows):
                 connection.executemany(f"INSERT INTO {table} VALUES ({places})", values)
+                counts[table] += len(values)
+    return counts
+
+
+def _require_rows(connection: Any, counts: Mapping[str, int]) -> None:
+    """Raise OSError unless the tables hold so many rows."""
+    for table, count in counts.items():
+        ((found,),) = connection.execute(f"SELECT COUNT(*) FROM {table}").fetchall()
+        if found != count:
+            raise OSError(errno.EIO, f"{found} of {count} rows of the table {table} after writing")
 
 
 def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.geometry import Grid
+from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile.reading.run_reader import Run
 
 WILDTRACK_STEP = 0.025
@@ -99,5 +100,6 @@ def _boxes_of_rows(run: Run) -> Mapping[tuple[int, int, int], Mapping[str, int]]
 def _write_zip(path: Path, texts: Iterable[tuple[str, str]]) -> None:
     """A zip of text files that is the same whenever it is written."""
     with ZipFile(path, "w") as archive:
+        archive.comment = MARK
         for name, text in texts:
             archive.writestr(ZipInfo(name), text, ZIP_DEFLATED)

@@ -14,6 +14,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.io.exports.movement import rows_by_track
+from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile.reading.run_reader import Run
 
 BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
@@ -32,6 +33,7 @@ def write_moving_features(path: Path, run: Run) -> None:
     """
     collection = {
         "type": "FeatureCollection",
+        "software": MARK.decode(),
         "crs": {"type": "Name", "properties": {"name": GROUND}},
         "trs": {"type": "Name", "properties": {"name": _ISO_8601}},
         "features": [_moving_point(run, run.tracks[k], rows) for k, rows in rows_by_track(run, run.trajectory)],
@@ -56,7 +58,7 @@ def write_geojson_lines(path: Path, run: Run) -> None:
                 "duration": round(int(track["last"] - track["first"]) / run.frame_rate, 6),
             }
             feature = {"type": "Feature", "id": int(track["id"]), "geometry": geometry, "properties": properties}
-            file.write(json.dumps(feature, allow_nan=False) + "\n")
+            file.write(json.dumps({**feature, "software": MARK.decode()}, allow_nan=False) + "\n")
 
 
 def _moving_point(run: Run, track: np.void, rows: Rows) -> dict[str, object]:

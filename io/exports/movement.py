@@ -18,6 +18,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.io.extras import load_extra
+from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile import layout
 from stseg.io.runfile.reading.run_reader import Run
 
@@ -26,7 +27,7 @@ _JUPEDSIM_VERSION = 2  # PedPy refuses the area of version 3; JuPedSim reads bot
 _MOTION_TOLERANCE = 1e-6  # metres
 _ONLY_AREA = 1  # its number among the areas of the recording; it does not change
 _JUPEDSIM_TABLES = """
-CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL /* made by stseg */);
 CREATE TABLE geometry(hash INTEGER NOT NULL, wkt TEXT NOT NULL);
 CREATE UNIQUE INDEX geometry_hash ON geometry(hash);
 CREATE TABLE frame_data(frame INTEGER NOT NULL, geometry_hash INTEGER NOT NULL);
@@ -76,6 +77,7 @@ def _dataset(path: Path, run: Run, kind: str, names: dict[str, Sequence[str]]) -
     individuals = [f"id_{number}" for number in run.tracks["id"].tolist()]
     texts = {**names, "space": ["x", "y"], "individual": individuals}
     with netcdf.File(path, "w") as file:
+        file.attrs["history"] = MARK.decode()
         file.dimensions = {"time": len(run.frames), **{name: len(labels) for name, labels in texts.items()}}
         file.create_variable("time", ("time",), float, run.frames / run.frame_rate)
         for name, labels in texts.items():

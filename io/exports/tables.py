@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.io.extras import load_extra
-from stseg.io.outputs.whole_files import replacing
+from stseg.io.outputs.whole_files import MARK, Inputs, replacing, require_output
 from stseg.io.runfile.reading.run_reader import Run
 from stseg.io.track_csv import write_tracks_csv
 
@@ -31,7 +31,7 @@ _UNITS = {
 
 def write_csv(path: Path, run: Run) -> None:
     """Write frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm; name where tracks have one."""
-    write_tracks_csv(path, run.trajectory)
+    write_tracks_csv(path, run.trajectory, overwrite=True)
     if run.names:
         header, *lines = path.read_text(encoding="utf-8").splitlines()
         names = [run.names.get(int(identity), "") for identity in run.trajectory["id"]]
@@ -58,7 +58,7 @@ def write_parquet(path: Path, run: Run) -> None:
         fields.append(arrow.field("name", arrow.string()))
         arrays.append(arrow.array([run.names.get(int(one)) for one in run.trajectory["id"]], arrow.string()))
     about = {"scene": run.scene, "frame_rate": run.frame_rate, "cameras": list(run.cameras)}
-    schema = arrow.schema(fields, {"stseg": json.dumps(about)})
+    schema = arrow.schema(fields, {"stseg": json.dumps(about), "software": MARK.decode()})
     with path.open("wb") as file:  # a path that is no UTF-8 is refused by the library
         parquet.write_table(arrow.table(arrays, schema=schema), file)
 
@@ -71,8 +71,10 @@ def write_napari_tracks(path: Path, run: Run) -> None:
         np.savetxt(file, table[["id", "frame", "z", "y", "x", "score", "height"]], fmt="%d,%d,%.4f,%.4f,%.4f,%.3f,%.3f")
 
 
-def write_tables(folder: Path, tables: Mapping[str, Rows], suffix: str, overwrite: bool) -> None:
+def write_tables(folder: Path, tables: Mapping[str, Rows], suffix: str, overwrite: bool, inputs: Inputs) -> None:
     """Write each table to FOLDER/NAME.SUFFIX, `csv` or `parquet`."""
+    for name, rows in tables.items():
+        require_output(folder / f"{name}.{suffix}", overwrite, inputs, ",".join(rows.dtype.names or ()))
     for name, rows in tables.items():
         with replacing(folder / f"{name}.{suffix}", overwrite) as part:
             (_write_parquet if suffix == "parquet" else _write_csv)(part, rows)
@@ -96,5 +98,6 @@ def _write_parquet(path: Path, rows: Rows) -> None:
     columns = {name: rows[name].tolist() for name in rows.dtype.names or ()}
     types = {name: arrow.string() if rows.dtype[name] == np.dtype("O") else None for name in columns}
     table = arrow.table({name: arrow.array(column, types[name]) for name, column in columns.items()})
+    table = table.replace_schema_metadata({"stseg": MARK.decode()})
     with path.open("wb") as file:  # a path that is no UTF-8 is refused by the library
         parquet.write_table(table, file)

@@ -16,6 +16,7 @@ from stseg.io.untrusted.values import parse_number, parse_numbers, parse_whole
 from stseg.records.tables import CORRECTION, TRAJECTORY
 
 _COLUMNS = ("frame", "time", "id", "x", "y", "height", "score")
+LIVE_HEADER = ",".join(_COLUMNS)
 COLUMNS = CORRECTION.names or ()
 _IDS = 1 << 31
 """Largest id in a line."""

@@ -16,18 +16,28 @@ import numpy as np
 
 from stseg.arrays import Bytes, Ints
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import clear_frames, output_errors, write_quickly
+from stseg.io.outputs.whole_files import (
+    NO_INPUTS,
+    Inputs,
+    clear_frames,
+    marked_png,
+    output_errors,
+    require_own_frames,
+    write_quickly,
+)
 from stseg.io.recording.pictures import encode_indexed
 from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name
 
 _BYTE, _WORD = 255, 65535
 
 
-def require_label_folder(folder: Path, overwrite: bool) -> None:
-    """Refuse a folder that holds something, before any work is done; raises OutputError."""
+def require_label_folder(folder: Path, cameras: Sequence[str], overwrite: bool, inputs: Inputs) -> None:
+    """Refuse a folder that holds something that may not be replaced, before any work is done; raises OutputError."""
     with output_errors(folder):
         if folder.exists() and any(folder.iterdir()) and not overwrite:
             raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
+        for camera in cameras:
+            require_own_frames(folder / camera, inputs)
 
 
 class LabelImages:
@@ -38,20 +48,29 @@ class LabelImages:
     already, cannot be written to, or an id is too large.
     """
 
-    def __init__(self, folder: Path, cameras: Sequence[str], largest: int, palette: Bytes, overwrite: bool) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        cameras: Sequence[str],
+        largest: int,
+        palette: Bytes,
+        overwrite: bool,
+        inputs: Inputs = NO_INPUTS,
+    ) -> None:
         if largest > _WORD:
             raise OutputError(folder, "", f"a track with the id {largest}", f"ids up to {_WORD}, the most in a PNG")
         self._folder, self._indexed, self._palette = folder, largest <= _BYTE, palette
-        require_label_folder(folder, overwrite)
+        folders = [self._folder_of(camera) for camera in cameras]
+        require_label_folder(folder, cameras, overwrite, inputs)
         with output_errors(folder):
-            for camera in cameras:
-                clear_frames(self._folder_of(camera))
+            for one in folders:
+                clear_frames(one, inputs)
 
     def write(self, camera: str, frame: int, ids: Ints) -> None:
         """Write one image, int64 (v, u); raises OutputError."""
         path = self._folder_of(camera) / f"{frame:06d}.png"
         with output_errors(path):
-            write_quickly(path, self._encoded(ids))
+            write_quickly(path, marked_png(self._encoded(ids)))
 
     def _encoded(self, ids: Ints) -> bytes:
         if self._indexed:

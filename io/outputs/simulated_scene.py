@@ -27,9 +27,10 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Bytes, Rows
 from stseg.errors import OutputError
 from stseg.geometry import Camera, Rig
-from stseg.io.outputs.whole_files import clear_frames
+from stseg.io.outputs.whole_files import clear_frames, marked_png
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source, SourceKind
 from stseg.io.recording.rigs import write_rig
+from stseg.io.untrusted.bounded_files import is_regular
 from stseg.io.untrusted.values import require_utf8
 
 _ANYBODY = BodyPrior()
@@ -76,6 +77,10 @@ class SimulatedScene(Protocol):
     def frame_sets(self) -> Iterator[SimulatedFrame]: ...
 
 
+_SCENE = "stseg-scene"
+"""Name of the empty file by which the folder of a scene is known."""
+
+
 def write_scene(
     folder: Path,
     scene: SimulatedScene,
@@ -88,7 +93,7 @@ def write_scene(
     """Film a scene into a folder, which is made if it does not exist.
 
     `body` is what the rig files say of the bodies. With `instances` there are instance images, too, one file a camera
-    and frame; with `overwrite` the folder need not be empty, and files of the same name are replaced. `progress` is
+    and frame; with `overwrite` the folder need not be empty, and files of an older scene are replaced. `progress` is
     called after each frame. OutputError where the folder holds something already, or cannot be written to.
     """
     require_utf8(folder, "a video")
@@ -96,6 +101,11 @@ def write_scene(
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()) and not overwrite:
             raise OutputError(folder, "", "files in it", "an empty folder, or leave to overwrite")
+        if not is_regular(folder / _SCENE):
+            for path in _outputs(folder, scene):
+                if os.path.lexists(path):
+                    raise OutputError(path, "", "a file that stseg did not make", "another folder, or none of its name")
+            (folder / _SCENE).touch()
         if links := [path.name for path in folder.iterdir() if path.is_symlink()]:
             raise OutputError(folder, "", f"{links[0]}, a link", "no links, which would be written through")
         if "video" in scene.kinds:
@@ -168,7 +178,7 @@ class _CameraFiles(AbstractContextManager["_CameraFiles"]):
         np.savetxt(self._boxes, rows, fmt="%d,%.1f,%.1f,%.1f,%.1f,%.3f")
         if self._instances is not None:
             _, png = cv2.imencode(".png", view.instances)
-            (self._instances / f"{frame:06d}.png").write_bytes(png.tobytes())
+            (self._instances / f"{frame:06d}.png").write_bytes(marked_png(png.tobytes()))
 
     def __exit__(self, *reason: object) -> None:
         self._stack.close()
@@ -191,12 +201,21 @@ def _write_rigs(folder: Path, scene: SimulatedScene, body: BodyPrior, instances:
     for kind in kinds:
         path = folder / rig_name(kind)
         sources = tuple(_source(folder, camera, kind, scene.frames) for camera in scene.rig.cameras)
-        write_rig(path, Recording(path, scene.rig, sources, body))
+        write_rig(path, Recording(path, scene.rig, sources, body), overwrite=True)
 
 
 def rig_name(kind: SourceKind) -> str:
     """Name of the rig file of one kind of foreground."""
     return "rig.toml" if kind == "video" else f"rig_{kind}.toml"
+
+
+def _outputs(folder: Path, scene: SimulatedScene) -> Iterator[Path]:
+    """Every file and folder that a scene may write."""
+    yield folder / "truth.csv"
+    for kind in (*scene.kinds, "instances"):
+        yield folder / rig_name(kind)
+    for camera in scene.rig.cameras:
+        yield from _paths(folder, camera).values()
 
 
 def _source(folder: Path, camera: Camera, kind: SourceKind, frames: int) -> CameraSource:

@@ -9,7 +9,7 @@ import cv2
 
 from stseg.arrays import Bytes
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import replacing
+from stseg.io.outputs.whole_files import MARK, replacing
 from stseg.io.untrusted.values import require_utf8
 
 _ENDING = ".mp4"
@@ -33,6 +33,8 @@ def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwri
         film = part.with_name(part.name + _ENDING)  # the ending decides the container
         try:
             count = _write(film, pictures, frame_rate)
+            with film.open("ab") as file:
+                file.write((8 + len(MARK)).to_bytes(4) + b"free" + MARK)  # a box that players pass over
             film.replace(part)
         finally:
             film.unlink(missing_ok=True)

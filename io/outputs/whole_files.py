@@ -2,6 +2,8 @@
 
 A part is `NAME.<16 hexadecimal digits>.part`, made with exclusive creation: it never is, nor follows, a file that was
 there before. Its name is the mark by which the parts of killed runs are known; nothing else is ever deleted.
+
+A file is replaced only where it carries our mark, and is none that the same command reads.
 """
 
 from __future__ import annotations
@@ -11,8 +13,11 @@ import os
 import re
 import secrets
 import time
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cached_property
+from itertools import chain
 from pathlib import Path
 
 from stseg.errors import OutputError
@@ -22,6 +27,78 @@ _ABANDONED = 3600.0
 """Time without a change after which an unlocked part belongs to a killed process, seconds."""
 _FRAME = re.compile(r"\d{6,}\.png", re.ASCII)
 _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+MARK = b"made by stseg"
+"""In every file of ours whose format has room for it."""
+_OURS = re.compile(rb"made by stseg|stseg-run")
+"""The mark, or the format of run files."""
+_SEARCHED = 1 << 22
+"""Bytes at the beginning and at the end of a file in which the mark is looked for."""
+
+
+class Inputs:
+    """Files that a command reads, known by device and inode when they are first asked for."""
+
+    def __init__(self, *paths: Iterable[Path | None]) -> None:
+        self._paths = chain.from_iterable(paths)
+
+    def __contains__(self, path: Path) -> bool:
+        identity = _identity(path)
+        return identity is not None and identity in self._identities
+
+    @cached_property
+    def _identities(self) -> frozenset[tuple[int, int] | None]:
+        return frozenset(_identity(path) for path in self._paths if path is not None) - {None}
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Device and inode of what a path leads to; None for nothing."""
+    try:
+        state = path.stat()
+    except (OSError, ValueError):
+        return None
+    return state.st_dev, state.st_ino
+
+
+NO_INPUTS = Inputs()
+
+
+def require_output(path: Path, overwrite: bool, inputs: Inputs = NO_INPUTS, table: str = "") -> None:
+    """Refuse an output as `require_new` does, and an older file that is an input or that stseg did not make.
+
+    `table` is a regular expression of the beginnings of text tables, whose formats have no room for the mark.
+    """
+    require_new(path, overwrite)
+    try:
+        if path in inputs:
+            raise OutputError(path, "", "a file that is read here", "another file: what is read is not replaced")
+        if os.path.lexists(path) and not _is_ours(path, table):
+            raise OutputError(path, "", "a file that stseg did not make", "a new name; --overwrite leaves it alone")
+    except OSError as error:
+        raise output_error(path, error) from error
+
+
+def _is_ours(path: Path, table: str = "") -> bool:
+    """Whether a file is regular, and empty, marked, or a table that begins so."""
+    if not is_regular(path):
+        return False
+    with path.open("rb") as file:
+        beginning, size = file.read(_SEARCHED), path.stat().st_size
+        if not beginning or _OURS.search(beginning) or (table and re.match(table.encode(), beginning)):
+            return True
+        file.seek(max(0, size - _SEARCHED))
+        return _OURS.search(file.read(_SEARCHED)) is not None
+
+
+def marked_png(png: bytes) -> bytes:
+    """A PNG file's bytes with the mark as a text behind the header."""
+    text = b"tEXtSoftware\0" + MARK
+    return png[:33] + (len(text) - 4).to_bytes(4) + text + zlib.crc32(text).to_bytes(4) + png[33:]
+
+
+def write_png(path: Path, png: bytes, overwrite: bool, inputs: Inputs) -> None:
+    """Write a PNG file's bytes with the mark; raises OutputError, see `require_output`."""
+    require_output(path, overwrite, inputs)
+    write_file(path, marked_png(png), overwrite)
 
 
 def require_new(path: Path, overwrite: bool) -> None:
@@ -126,14 +203,21 @@ def write_quickly(path: Path, data: bytes) -> None:
             part.unlink(missing_ok=True)
 
 
-def clear_frames(folder: Path) -> None:
-    """Make a folder for numbered images, without those of an earlier run; raises OSError, also where it is a link."""
-    folder.mkdir(parents=True, exist_ok=True)
+def require_own_frames(folder: Path, inputs: Inputs) -> list[Path]:
+    """The numbered images in a folder, all ours; OutputError where one is not, or is read by the same command."""
     if folder.is_symlink():
         raise OSError(errno.ELOOP, f"{folder.name} is a link")
-    for file in folder.iterdir():
-        if _FRAME.fullmatch(file.name) and is_regular(file):
-            file.unlink()
+    frames = [file for file in folder.iterdir() if _FRAME.fullmatch(file.name)] if folder.is_dir() else []
+    for file in frames:
+        require_output(file, True, inputs)
+    return frames
+
+
+def clear_frames(folder: Path, inputs: Inputs = NO_INPUTS) -> None:
+    """Make a folder for numbered images, without those of an earlier run; raises OSError, also where it is a link."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for file in require_own_frames(folder, inputs):
+        file.unlink()
 
 
 def _remove_abandoned(path: Path) -> None:
@@ -161,7 +245,7 @@ def output_error(path: Path, error: OSError) -> OutputError:
     return OutputError(path, "", error.strerror or error, "a place with room that can be written")
 
 
-def write_page(path: Path, page: str, overwrite: bool = True) -> None:
+def write_page(path: Path, page: str, overwrite: bool) -> None:
     """Write an HTML page, whole or not at all.
 
     OutputError where the file exists and is not to be overwritten, or cannot be written.

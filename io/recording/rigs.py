@@ -17,7 +17,7 @@ import numpy as np
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.io.detections.tables import COLUMNS
-from stseg.io.outputs.whole_files import write_file
+from stseg.io.outputs.whole_files import MARK, Inputs, require_output, write_file
 from stseg.io.recording.recording import (
     SOURCE_KINDS,
     BodyPrior,
@@ -28,6 +28,7 @@ from stseg.io.recording.recording import (
     SourceKind,
 )
 from stseg.io.recording.rig_text import FORMAT, format_rig
+from stseg.io.recording.source_files import recording_files
 from stseg.io.toml import ANY, Table, parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
@@ -91,11 +92,11 @@ def parse_rig(text: str, path: Path) -> Recording:
     return Recording(path, rig, tuple(_camera_source(table) for table in tables), body)
 
 
-def write_rig(path: str | Path, recording: Recording) -> None:
+def write_rig(path: str | Path, recording: Recording, overwrite: bool = False) -> None:
     """Write a rig file; `read_recording` gives back the same recording, to the last bit.
 
-    Paths of streams are written relative to the file, unless they are absolute and lie elsewhere. An existing file is
-    replaced, whole or not at all.
+    Paths of streams are written relative to the file, unless they are absolute and lie elsewhere. With `overwrite` an
+    older file that stseg wrote is replaced, whole or not at all.
 
     Raises
     ------
@@ -105,13 +106,14 @@ def write_rig(path: str | Path, recording: Recording) -> None:
         Where the file cannot be written.
     """
     path = Path(path)
-    text = format_rig(recording, path)
+    text = f"# {MARK.decode()}\n{format_rig(recording, path)}"
     parse_rig(text, path)
     try:
         data = text.encode("utf-8")
     except UnicodeEncodeError as error:
         raise OutputError(path, "", "a name that UTF-8 cannot hold", "names of readable characters") from error
-    write_file(path, data)
+    require_output(path, overwrite, Inputs(recording_files(replace(recording, path=Path()))))
+    write_file(path, data, overwrite)
 
 
 def _named(tables: tuple[Table, ...]) -> tuple[Table, ...]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
 
 from stseg.errors import SourceError
-from stseg.io.recording.recording import Source
+from stseg.io.recording.recording import Recording, Source
 
 _SUFFIXES = frozenset((".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"))
 _NUMBER = re.compile(r"(\d+)", re.ASCII)
@@ -37,6 +38,15 @@ def source_files(source: Source) -> Iterator[Path]:
         else:
             yield from image_paths(part.path, "")
     yield from (path for path in (source.image_list, source.appearance) if path is not None)
+
+
+def recording_files(recording: Recording) -> Iterator[Path]:
+    """The rig file, and every file of the sources that are there."""
+    yield recording.path
+    for feed in recording.sources:
+        for source in (feed.source, feed.background, feed.images):
+            with suppress(OSError, SourceError):
+                yield from source_files(source) if source is not None else ()
 
 
 def class_lists(folder: Path) -> Iterator[Path]:

@@ -12,7 +12,7 @@ from stseg.errors import ConfigError
 from stseg.io.answers import read_names
 from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS, help_text, write_tracks
-from stseg.io.outputs.whole_files import replacing, require_new
+from stseg.io.outputs.whole_files import Inputs, replacing, require_output
 from stseg.io.runfile.runs import Run, read_run
 
 
@@ -54,14 +54,13 @@ def export(
         raise ConfigError("command line", "--to", repr(to), f"one of {', '.join((*FORMATS, *ARCHIVES))}")
     if more and to not in ARCHIVES:
         raise ConfigError("command line", "RUN", f"{1 + len(more)} run files", f"one, or --to {' or '.join(ARCHIVES)}")
-    require_new(output, overwrite)
-    if output.exists() and any(one.exists() and output.samefile(one) for one in (run, *more)):
-        raise ConfigError("command line", "--output", "the run file itself", "another file")
-    contents = read_run(run)
+    contents, others = read_run(run), [read_run(one) for one in more]
+    inputs = Inputs([names], *(one.files for one in (contents, *others)))
+    require_output(output, overwrite, inputs, FORMATS[to].table if to in FORMATS else "")
     if names is not None:
         contents = contents.with_names(read_names(names))
     if to in ARCHIVES:
-        _archive(to, output, [contents, *map(read_run, more)], overwrite)
+        _archive(to, output, [contents, *others], overwrite)
         return
     with replacing(output, overwrite) as part:
         write_tracks(to, part, contents)

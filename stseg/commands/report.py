@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.answers import read_names
+from stseg.io.outputs.whole_files import Inputs
 from stseg.io.runfile.runs import read_run
 from stseg.tasks import report as reports
 
@@ -65,12 +66,13 @@ def report(
     overwrite
         Replace the page, the pictures and the film if they exist.
     """
-    reports.require_outputs(output, pictures, video, frames, overwrite)
     run = read_run(run_file)
+    inputs = Inputs(run.files, [truth, names])
+    reports.require_outputs(output, pictures, video, frames, overwrite, inputs)
     if names is not None:
         run = run.with_names(read_names(names))
     if output is not None:
-        for path in reports.write_report(run, output, truth, frame, pictures, camera_images, overwrite):
+        for path in reports.write_report(run, output, truth, frame, pictures, camera_images, overwrite, inputs):
             print(f"wrote {path}")
     if video is not None:
         chosen = FrameRange.parsed(frames)

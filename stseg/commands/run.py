@@ -113,10 +113,12 @@ def run(
         return
     if labels is not None:
         from stseg.io.outputs.label_images import require_label_folder
+        from stseg.io.outputs.whole_files import Inputs
+        from stseg.io.recording.source_files import recording_files
         from stseg.tasks.pixel_labels import label_images, require_pixels
 
-        require_pixels(recording)
-        require_label_folder(labels, overwrite)
+        pixels, inputs = require_pixels(recording), Inputs(recording_files(recording))
+        require_label_folder(labels, [recording.rig.cameras[k].name for k in pixels], overwrite, inputs)
     done = track_recording(
         recording, output, resolved, tracker, volume, chosen, workforce, reporter, known=known, overwrite=overwrite
     )

@@ -23,8 +23,10 @@ from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.identities.association import NO_KNOWN_PEOPLE
 from stseg.io.config_file import format_config
+from stseg.io.outputs.whole_files import Inputs
 from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.recording import Recording
+from stseg.io.recording.source_files import recording_files
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run
@@ -152,7 +154,7 @@ def track_recording(
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
     request |= {"--known": "nobody" if known is None else digest(people)}
     work = WorkFolder(output, request)
-    work.require_output(overwrite)
+    work.require_output(overwrite, Inputs(recording_files(recording), [known]))
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         if not folder.published:
             workforce.prepare()

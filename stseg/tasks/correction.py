@@ -13,13 +13,13 @@ from stseg.arrays import Ints, Rows
 from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import associated_tracks
 from stseg.engine.recordings import run_of
-from stseg.errors import ConfigError, FormatError, InputError
+from stseg.errors import FormatError, InputError
 from stseg.identities.review.answered_constraints import AnsweredRows, answered_rows
 from stseg.identities.review.corrections import ACTIONS, Answer, Corrections, solve_corrections
 from stseg.identities.search.constraints import Constraints
 from stseg.io.answers import read_answers
 from stseg.io.config_file import parse_config
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.untrusted.bounded_files import read_text
@@ -70,16 +70,14 @@ def correct(run: Run | Path | str, answers: Path | str, output: Path | str, *, o
     InputError
         For an answer that names no such track or frame, or that contradicts another.
     """
-    source, output, answers = run.path if isinstance(run, Run) else Path(run), Path(output), Path(answers)
-    require_new(output, overwrite)
-    if output.exists() and source.exists() and output.samefile(source):
-        raise ConfigError("command line", "--output", "the run file itself", "another file")
-    found, rows = run_of(run), read_answers(answers, ACTIONS)
+    found, output, answers = run_of(run), Path(output), Path(answers)
+    require_output(output, overwrite, Inputs(found.files, [answers]))
+    rows = read_answers(answers, ACTIONS)
     given = tuple(Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows)
     corrected = corrected_tracks(found, given)
     write_corrected(
-        source, output, corrected.tracks, corrected.answered, corrected.new_ids, corrected.names, read_text(answers),
-        overwrite,
+        found.path, output, corrected.tracks, corrected.answered, corrected.new_ids, corrected.names,
+        read_text(answers), overwrite,
     )  # fmt: skip
     return CorrectedRun(read_run(output), given)
 

@@ -10,7 +10,7 @@ import numpy as np
 from stseg.engine.recordings import run_of
 from stseg.io.areas import read_lines, read_polygons
 from stseg.io.exports.tables import write_tables
-from stseg.io.outputs.whole_files import make_folder, write_file
+from stseg.io.outputs.whole_files import Inputs, make_folder, write_png
 from stseg.io.runfile.runs import Run
 from stseg.measures.areas import Areas, Line, Zone
 from stseg.measures.measure import Measures, measure_tracks
@@ -61,10 +61,12 @@ def measure(
     if output is not None:
         folder = Path(output)
         make_folder(folder)
-        write_tables(folder, measures.tables(), format_, overwrite)
+        inputs = Inputs(found.files, [None if one is None else Path(one) for one in (zones, lines)])
+        write_tables(folder, measures.tables(), format_, overwrite, inputs)
         drawn_zones = [(zone.name, zone.rings) for zone in areas.zones]
         drawn_lines = [(line.name, line.points) for line in areas.lines]
-        write_file(folder / "flow.png", png_bytes(flow_map(rig, measures.field, drawn_zones, drawn_lines)), overwrite)
+        flow = png_bytes(flow_map(rig, measures.field, drawn_zones, drawn_lines))
+        write_png(folder / "flow.png", flow, overwrite, inputs)
     return measures
 
 

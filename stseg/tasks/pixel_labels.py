@@ -16,6 +16,7 @@ from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import SourceError
 from stseg.io.config_file import parse_config
 from stseg.io.outputs.label_images import LabelImages
+from stseg.io.outputs.whole_files import Inputs
 from stseg.io.recording.frames import FrameSet, open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
@@ -72,7 +73,8 @@ def label_images(
         config = parse_config(found.provenance.config, f"{found.path}: the configuration", tuple(changes))
     chosen, reporter, cameras = frames_of_run(found, frames), reporter_of(progress), require_pixels(found.recording)
     people, largest = _people(found.trajectory, chosen), int(found.trajectory["id"].max(initial=0))
-    images = LabelImages(Path(folder), [found.cameras[k] for k in cameras], largest, track_palette(), overwrite)
+    names, inputs = [found.cameras[k] for k in cameras], Inputs(found.files)
+    images = LabelImages(Path(folder), names, largest, track_palette(), overwrite, inputs)
     views = view_labels(found.recording.rig, config.labels, config.body)
     colours = _appearances(found, views, people, chosen, reporter)
     foregrounds = make_foregrounds(found.recording, config, int(found.frames[0]), int(found.frames[-1]) + 1)

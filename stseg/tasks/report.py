@@ -16,7 +16,7 @@ from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
 from stseg.io.outputs.video_writer import require_film_name, write_film
-from stseg.io.outputs.whole_files import make_folder, require_new, write_file, write_page
+from stseg.io.outputs.whole_files import Inputs, make_folder, require_output, write_page, write_png
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
@@ -81,13 +81,15 @@ def report(
     InputError
         Where nothing is to be written, a file exists, or the run has no such frame.
     """
-    page, folder, movie = (None if path is None else Path(path) for path in (output, pictures, video))
-    require_outputs(page, folder, movie, None if frames is None else "{}:{}".format(*frames), overwrite)
+    page, folder, movie, true, named = (
+        None if path is None else Path(path) for path in (output, pictures, video, truth, names)
+    )
     found = run_of(run)
-    if names is not None:
-        found = found.with_names(read_names(Path(names)))
-    true = None if truth is None else Path(truth)
-    paths = [] if page is None else write_report(found, page, true, frame, folder, camera_images, overwrite)
+    inputs = Inputs(found.files, [true, named])
+    require_outputs(page, folder, movie, None if frames is None else "{}:{}".format(*frames), overwrite, inputs)
+    if named is not None:
+        found = found.with_names(read_names(named))
+    paths = [] if page is None else write_report(found, page, true, frame, folder, camera_images, overwrite, inputs)
     if movie is not None:
         film(found, movie, frames, camera_images, reporter_of(progress), overwrite)
         paths.append(movie)
@@ -95,7 +97,12 @@ def report(
 
 
 def require_outputs(
-    output: Path | None, pictures: Path | None, video: Path | None, frames: str | None, overwrite: bool
+    output: Path | None,
+    pictures: Path | None,
+    video: Path | None,
+    frames: str | None,
+    overwrite: bool,
+    inputs: Inputs,
 ) -> None:
     """Refuse outputs that cannot be written and options without effect, before any work."""
     if output is None and video is None:
@@ -106,7 +113,7 @@ def require_outputs(
         raise ConfigError("command line", "--frames", frames, "--video FILM.mp4 with it")
     for path in (output, video):
         if path is not None:
-            require_new(path, overwrite)
+            require_output(path, overwrite, inputs)
     if video is not None:
         require_film_name(video)
 
@@ -119,6 +126,7 @@ def write_report(
     pictures: Path | None,
     camera_images: bool,
     overwrite: bool,
+    inputs: Inputs,
 ) -> list[Path]:
     """Write the page and its pictures, see `report`; the files that were written."""
     rows = None if truth is None else read_tracks_csv(truth)
@@ -129,7 +137,8 @@ def write_report(
     if pictures is None:
         return [output]
     drawn = instants if frame else instants[len(instants) // 2 :][:1]
-    return [output, *write_figures(pictures, [*contents.still, *_named(run.recording, run, drawn)], overwrite)]
+    still = [*contents.still, *_named(run.recording, run, drawn)]
+    return [output, *write_figures(pictures, still, overwrite, inputs)]
 
 
 def film(
@@ -177,7 +186,7 @@ def write_pictures(
     """
     instants = _read_instants(run, recording, [frame], camera_images)
     ground = ground_figures(recording.rig, run.views, run.trajectory, truth, run.names)
-    return write_figures(folder, [*ground, *_named(recording, run, instants)], True)
+    return write_figures(folder, [*ground, *_named(recording, run, instants)], True, Inputs(run.files))
 
 
 def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
@@ -215,13 +224,13 @@ def _named(recording: Recording, run: Run, instants: Sequence[Instant]) -> list[
     return figures
 
 
-def write_figures(folder: Path, figures: Iterable[Figure], overwrite: bool) -> list[Path]:
+def write_figures(folder: Path, figures: Iterable[Figure], overwrite: bool, inputs: Inputs) -> list[Path]:
     """Write figures as PNG files; their paths."""
     make_folder(folder)
     paths = []
     for figure in figures:
         paths.append(folder / f"{figure.name}.png")
-        write_file(paths[-1], png_bytes(figure.picture), overwrite)
+        write_png(paths[-1], png_bytes(figure.picture), overwrite, inputs)
     return paths
 
 

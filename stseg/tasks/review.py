@@ -19,7 +19,7 @@ from stseg.identities.review.corrections import Answer
 from stseg.identities.review.doubts import Doubt, find_doubts
 from stseg.identities.search.costs import CONTRADICTION
 from stseg.io.config_file import parse_config
-from stseg.io.outputs.whole_files import require_new, write_page
+from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.runfile.runs import Run, read_run
 from stseg.reporting.page.review_page import Question, best_views, moment_picture, review_page
 from stseg.tasks.correction import answered_before, is_solved_again
@@ -86,8 +86,8 @@ def write_review(run_file: Path, output: Path, *, most: int, camera_images: bool
     InputError
         Where the run file cannot be read, or the page exists.
     """
-    require_new(output, overwrite)
     run = read_run(run_file)
+    require_output(output, overwrite, Inputs(run.files))
     run.require_fit()
     doubts = doubtful_decisions(run)[:most]
     frames = sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)})

@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import ConfigError
-from stseg.io.outputs.whole_files import require_new, write_file
+from stseg.io.outputs.whole_files import Inputs, marked_png, require_output, write_file
 from stseg.io.runfile.runs import Run
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.slices import marginal_picture, plane_picture
@@ -35,7 +35,7 @@ def write_slice(run: Run, text: str, output: Path, overwrite: bool) -> str:
         Where the text is not of that form, or the run has no such frame or plane.
     OutputError
     """
-    require_new(output, overwrite)
+    require_output(output, overwrite, Inputs(run.files))
     wanted = _parse(text)
     frame = _frame(run, wanted, text)
     grid, (log_odds, label) = run.recording.rig.grid, run.read_frame(frame)
@@ -45,7 +45,7 @@ def write_slice(run: Run, text: str, output: Path, overwrite: bool) -> str:
     else:
         plane = _plane(run.heights, wanted["plane"])
         picture, where = plane_picture(log_odds, label, grid, plane, title, _WIDTH), f"{run.heights[plane]:.2f} m"
-    write_file(output, png_bytes(picture), overwrite)
+    write_file(output, marked_png(png_bytes(picture)), overwrite)
     return f"frame {frame} ({frame / run.frame_rate:.2f} s), {where}"
 
 

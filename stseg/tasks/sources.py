@@ -12,10 +12,10 @@ import numpy as np
 from stseg.arrays import Bytes, Flags, Floats, Observation
 from stseg.geometry import Camera, Grid
 from stseg.io.detections.source_detections import SourceDetections, read_source
-from stseg.io.outputs.whole_files import make_folder, write_file
+from stseg.io.outputs.whole_files import Inputs, make_folder, write_png
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording
-from stseg.io.recording.source_files import is_detection_file
+from stseg.io.recording.source_files import is_detection_file, recording_files
 from stseg.reporting.figures import backdrop
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.canvas import outline
@@ -111,6 +111,7 @@ def summarise_sources(recording: Recording) -> list[SourceSummary]:
 def write_source_pictures(recording: Recording, summaries: list[SourceSummary], folder: Path, overwrite: bool) -> bool:
     """Write a picture of each camera amid what the cameras deliver; whether they show camera frames."""
     make_folder(folder)
+    inputs = Inputs(recording_files(recording))
     counts = [one.detections.frames for one in summaries if one.detections is not None]
     frame, pictured = min(counts) // 2 if counts else 0, recording.pictured()
     views: tuple[Observation, ...] = (None,) * len(summaries)
@@ -118,7 +119,8 @@ def write_source_pictures(recording: Recording, summaries: list[SourceSummary], 
         for frame_set in frame_sets:
             views = frame_set.views
     for summary, view in zip(summaries, views, strict=True):
-        write_file(folder / f"{summary.camera.name}.png", png_bytes(summary.picture(view, frame)), overwrite)
+        picture = png_bytes(summary.picture(view, frame))
+        write_png(folder / f"{summary.camera.name}.png", picture, overwrite, inputs)
     return any(stream.source.kind in ("video", "images") for stream in pictured.sources)
 
 

@@ -18,6 +18,7 @@ from stseg.io.answers import read_answers, read_names
 from stseg.io.detections.masks import RunLengths, polygons, run_lengths
 from stseg.io.detections.record import Detections, last_numbers
 from stseg.io.detections.source_detections import instance_image, read_source
+from stseg.io.outputs.whole_files import NO_INPUTS
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.recording import Source
 from stseg.io.recording.rigs import parse_rig, read_recording
@@ -46,6 +47,17 @@ def test_a_foreign_folder_is_left_alone(tmp_path: Path, refusal: Command) -> Non
     for more in ((), ("--frames", "5:3"), ("--overwrite",)):
         assert "did not make" in refusal("run", rig, "-o", tmp_path / "q.h5", *more)
     assert {path.name: path.read_text() for path in folder.iterdir()} == dict.fromkeys(names, "precious")
+
+
+def test_foreign_folders_that_are_called_removed_stay(tmp_path: Path) -> None:
+    for number, names in enumerate((("begun.json",), ("begun.json", "stseg-work-folder", "thesis.txt"))):
+        folder = tmp_path / f"q.h5.segments.{number:016x}.removed"
+        folder.mkdir()
+        for name in names:
+            (folder / name).write_text("precious")
+    before = sorted(tmp_path.rglob("*"))
+    WorkFolder(tmp_path / "q.h5", {}).require_output(False, NO_INPUTS)
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_work_folder_that_is_a_link_is_refused(tmp_path: Path, refusal: Command) -> None:

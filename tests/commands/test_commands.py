@@ -208,10 +208,12 @@ def test_export_destroys_nothing(run_path: Path, tmp_path: Path, refusal: Comman
     target.write_text("precious")
     command = ["export", str(run_path), "--to", "csv", "-o", str(target)]
     assert "exists" in refusal(*command)
+    assert "did not make" in refusal(*command, "--overwrite")
     assert target.read_text() == "precious"
-    assert main([*command, "--overwrite"]) == 0
+    target.unlink()
+    assert main(command) == main([*command, "--overwrite"]) == 0
     assert target.read_text().startswith("frame,id,x,y")
-    assert "the run file itself" in refusal("export", run_path, "--to", "csv", "-o", run_path, "--overwrite")
+    assert "a file that is read here" in refusal("export", run_path, "--to", "csv", "-o", run_path, "--overwrite")
     assert len(read_run(run_path).frames) == 6
 
 

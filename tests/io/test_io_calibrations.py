@@ -304,7 +304,10 @@ class TestCommand:
         Path("room.toml").write_text("mine")
         tokens = ("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml")
         refused(OutputError, r"room.toml: found a file that exists, expected a new name, or --over", calibrate, *tokens)
+        refused(OutputError, r"room.toml: found a file that stseg did not make", calibrate, *tokens, "--overwrite")
         assert Path("room.toml").read_text() == "mine"
+        Path("room.toml").unlink()
+        calibrate(*tokens)
         calibrate(*tokens, "--overwrite")
         assert len(read_recording("room.toml").rig.cameras) == 2
 

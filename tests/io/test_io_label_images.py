@@ -15,6 +15,7 @@ from stseg.config import LabelConfig
 from stseg.errors import OutputError
 from stseg.geometry import Rig
 from stseg.io.outputs.label_images import LabelImages
+from stseg.io.outputs.whole_files import Inputs
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.streams import open_images
 
@@ -79,6 +80,18 @@ def test_a_folder_with_files_is_refused_and_old_images_go(tmp_path: Path) -> Non
     refused(OutputError, "files in it", LabelImages, tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
     LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=True)
     assert not list((tmp_path / "out" / "west").iterdir())
+
+
+def test_images_that_are_foreign_or_are_read_stay(tmp_path: Path) -> None:
+    """Sources are often called as label images are: images/CAMERA/000000.png."""
+    out = (tmp_path / "out", ["east", "west"], 3, PALETTE, True)
+    LabelImages(*out).write("east", 0, np.zeros((4, 4), np.int64))
+    (made,) = (tmp_path / "out" / "east").iterdir()
+    refused(OutputError, "a file that is read here", LabelImages, *out, Inputs([made]))
+    cv2.imwrite(str(tmp_path / "out" / "west" / "000000.png"), np.zeros((4, 4), np.uint8))
+    refused(OutputError, r"000000\.png: found a file that stseg did not make", LabelImages, *out)
+    assert made.exists()
+    assert (tmp_path / "out" / "west" / "000000.png").exists()
 
 
 def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:

@@ -196,9 +196,12 @@ class TestWrite:
         path = tmp_path / "rig.toml"
         path.write_text(RIG)
         recording = read_recording(path)
+        refused(OutputError, "a file that exists", write_rig, path, recording)
+        refused(OutputError, "did not make", write_rig, path, recording, overwrite=True)
+        path.unlink()
         write_rig(path, recording)
         first = path.read_text()
-        write_rig(path, read_recording(path))
+        write_rig(path, read_recording(path), overwrite=True)
         assert path.read_text() == first
         assert 'path = "../boxes/cam2.txt"' in first
 

@@ -60,6 +60,10 @@ def test_truth_keeps_its_flags(path: Path) -> None:
     write_truth_csv(path, truth)
     assert path.read_text().splitlines()[0] == "frame,id,x,y,flag"
     assert read_tracks_csv(path).tolist() == truth.tolist()
+    refused(OutputError, "exists", write_truth_csv, path, truth)
+    write_truth_csv(path, truth[:1], overwrite=True)
+    assert read_tracks_csv(path).tolist() == truth[:1].tolist()
+    refused(OutputError, "did not make", write_tracks_csv, path, trajectory([]), overwrite=True)
 
 
 def test_columns_may_stand_in_any_order_among_others(path: Path) -> None:

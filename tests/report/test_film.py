@@ -121,9 +121,12 @@ def test_slips_are_told_before_any_work(
 def test_an_older_film_is_kept_unless_it_may_go(run_path: Path, tmp_path: Path) -> None:
     (tmp_path / "a.mp4").write_text("precious")
     assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4")]) == 2
+    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4"), "--overwrite"]) == 2
     assert (tmp_path / "a.mp4").read_text() == "precious"
-    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4"), "--overwrite"]) == 0
-    assert len(frames_of(tmp_path / "a.mp4")) == 6
+    (tmp_path / "a.mp4").unlink()
+    for _ in range(2):
+        assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4"), "--overwrite"]) == 0
+        assert len(frames_of(tmp_path / "a.mp4")) == 6
 
 
 def test_what_goes_wrong_on_the_way_leaves_no_film(tmp_path: Path) -> None:

@@ -171,7 +171,9 @@ def test_errors_of_the_user_are_reported(run_path: Path, tmp_path: Path) -> None
     refused(ConfigError, r"--frame.*found 99.*10 to 15", report, run_path, output=tmp_path / "a.html", frame=(99,))
     (tmp_path / "old.html").write_text("old")
     refused(OutputError, "overwrite", report, run_path, output=tmp_path / "old.html")
-    assert page_of(run_path, tmp_path / "old.html", overwrite=True, frame=(11,)) != "old"
+    refused(OutputError, "did not make", report, run_path, output=tmp_path / "old.html", overwrite=True)
+    (tmp_path / "old.html").write_text("old, made by stseg")
+    assert not page_of(run_path, tmp_path / "old.html", overwrite=True, frame=(11,)).startswith("old")
     refused(OutputError, "found", report, run_path, output=tmp_path / "a.html", pictures=run_path, frame=(11,))
 
 

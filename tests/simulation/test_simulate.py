@@ -457,6 +457,10 @@ def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
     write_scene(tmp_path, film, overwrite=True)
     assert (tmp_path / "notes.txt").read_text() == "mine"
+    (tmp_path / "stseg-scene").unlink()
+    refused(
+        OutputError, r"truth\.csv: found a file that stseg did not make", write_scene, tmp_path, film, overwrite=True
+    )
     with pytest.raises(OutputError):
         write_scene(tmp_path / "notes.txt" / "below", film)
 
@@ -472,7 +476,7 @@ def test_command_changes_the_named_scene(tmp_path: Path, capsys: pytest.CaptureF
 def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     simulate(tmp_path / "s", scene="long", cameras=2, seconds=0.4, size="64,48")
     assert {path.name for path in (tmp_path / "s").iterdir()} == {
-        "rig_boxes.toml", "truth.csv", "cam1_boxes.csv", "cam2_boxes.csv",
+        "stseg-scene", "rig_boxes.toml", "truth.csv", "cam1_boxes.csv", "cam2_boxes.csv",
     }  # fmt: skip
     assert "rig_boxes.toml: 2 frames" in capsys.readouterr().out
     spec = replace(NAMED["long"], seconds=0.4, cameras=2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -17,6 +18,7 @@ from stseg.geometry import Grid
 from stseg.io.extras import load_extra
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
+from stseg.io.recording.source_files import recording_files
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, PackedFrames
@@ -92,6 +94,11 @@ class Run:
     views: Bytes
     kept: str = "all"
     given_names: tuple[tuple[int, str], ...] | None = None
+
+    @property
+    def files(self) -> Iterator[Path]:
+        """The run file, and the files of its recording that are there."""
+        return chain((self.path,), recording_files(self.recording))
 
     def __repr__(self) -> str:
         frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"

@@ -24,7 +24,15 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Self
 
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import create_part, output_error, publish_part, require_new, sync_folder, write_file
+from stseg.io.outputs.whole_files import (
+    Inputs,
+    create_part,
+    output_error,
+    publish_part,
+    require_output,
+    sync_folder,
+    write_file,
+)
 from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.unfinished.part_file import lock
@@ -109,11 +117,11 @@ class WorkFolder:
         except OSError:
             return False
 
-    def require_output(self, overwrite: bool) -> None:
-        """Refuse an output that exists, unless it is the finished run file of this folder; raises OutputError."""
+    def require_output(self, overwrite: bool, inputs: Inputs) -> None:
+        """Refuse an output that may not be replaced, unless it is the finished run file of this folder."""
         self._finish_removals()
         if not self.published:
-            require_new(self.output, overwrite)
+            require_output(self.output, overwrite, inputs)
 
     def publish(self, overwrite: bool) -> None:
         """Give the finished run file its name; the folder keeps it too, until it is removed.
@@ -220,7 +228,7 @@ class WorkFolder:
         name = re.compile(rf"{re.escape(self.path.name)}\.[0-9a-f]{{16}}\.removed")
         with suppress(OSError):
             for path in self.path.parent.iterdir():
-                if name.fullmatch(path.name) and not path.is_symlink():
+                if name.fullmatch(path.name) and not path.is_symlink() and _is_deletable(path):
                     _delete(path)
 
     def _begin(self) -> None:
@@ -248,6 +256,12 @@ def _delete(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
     (folder / _MARK).unlink(missing_ok=True)
     folder.rmdir()
+
+
+def _is_deletable(folder: Path) -> bool:
+    """Whether a folder holds our mark and else only what a published run leaves; or nothing, where a kill came last."""
+    names = {path.name for path in folder.iterdir()}
+    return names <= _PUBLISHED_FILES and (not names or is_regular(folder / _MARK))
 
 
 def _open_own(path: Path) -> BinaryIO:

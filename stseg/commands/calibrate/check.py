@@ -12,7 +12,9 @@ from rich.table import Table
 
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
+from stseg.io.recording.rigs import read_recording
+from stseg.io.recording.source_files import recording_files
 from stseg.tasks.calibration.check import COLUMNS, RigCheck, check_rig
 
 
@@ -54,7 +56,7 @@ def check(
         Replace the page and the pictures if they exist.
     """
     if output is not None:
-        require_new(output, overwrite)
+        require_output(output, overwrite, Inputs(recording_files(read_recording(rig))))
     found = check_rig(rig, frames=FrameRange.parsed(frames), progress=TerminalReporter())
     if as_json:
         print(json.dumps(found.as_dict(), indent=2))

@@ -16,7 +16,7 @@ from stseg.geometry.rig import is_mirrored
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.formats import FORMATS, ImportOptions, help_text, read_cameras
 from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_median_height
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
 from stseg.io.untrusted.values import one_of
@@ -75,14 +75,15 @@ def import_calibration(
     overwrite
         Replace the rig file if it exists.
     """
-    require_new(output, overwrite)
+    require_output(output, overwrite, Inputs(Path(part) for file in files for part in file.split("+")))
     shared = None if size is None else size_of(size)
     foreign = _named(_read(format, files, ImportOptions(shared, unit, head)), files, names)
     world = _world(foreign, unit, up, mirrored)
     cameras = tuple(world.camera(one, one.name, _size(one, shared)) for one in foreign)
     rig = Rig(scene.scene or output.stem, scene.frame_rate, scene.grid, cameras)
     try:
-        write_rig(output, Recording(output, rig, (streams or StreamOptions()).of([camera.name for camera in cameras])))
+        sources = (streams or StreamOptions()).of([camera.name for camera in cameras])
+        write_rig(output, Recording(output, rig, sources), overwrite)
     except CalibrationError:
         _require_front(foreign, rig, world)
         raise

@@ -12,7 +12,7 @@ from stseg.calibration.points.checkerboard import find_corners, fit_lens
 from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError
 from stseg.io.calibrations.xml_files import write_opencv_lens
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
 from stseg.tasks.calibration.automatic import uncalibrated_camera
@@ -53,7 +53,7 @@ def calibrate_lens(
     overwrite
         Replace the file if it exists.
     """
-    require_new(output, overwrite)
+    require_output(output, overwrite, Inputs([video]))
     columns, rows = (int(side) for side in numbers("--board", board, "columns,rows of inner corners", 2))
     if min(columns, rows) < 3 or every < 1 or not square > 0:
         raise ConfigError(

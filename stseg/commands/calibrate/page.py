@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from stseg.arrays import Bytes
 from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError, SourceError
-from stseg.io.outputs.whole_files import require_new, write_page
+from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.recording.pictures import read_colour
 from stseg.io.recording.recording import Source
 from stseg.io.recording.source_files import is_image_source
@@ -50,7 +50,7 @@ def calibrate_page(
     overwrite
         Replace the page if it exists.
     """
-    require_new(output, overwrite)
+    require_output(output, overwrite, Inputs(videos, [plan]))
     names = camera_names(videos)
     if not videos or len(set(names)) < len(names):
         raise ConfigError("calibrate page", "VIDEO", ", ".join(map(str, videos)), "one or more, with different names")

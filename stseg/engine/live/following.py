@@ -28,12 +28,13 @@ from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
 from stseg.io.live.live_stream import is_live
-from stseg.io.live.live_tables import CorrectionTable, LiveTable
+from stseg.io.live.live_tables import COLUMNS, LIVE_HEADER, CorrectionTable, LiveTable
 from stseg.io.live.publishing import Publisher, Receiver
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.recording import Recording
+from stseg.io.recording.source_files import recording_files
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run
@@ -98,10 +99,11 @@ def follow_recording(
     request |= {"--tracker": tracker, "--volume": volume, "--follow": "yes"}
     del request["source"], request["samples of source"]  # the files change during the run
     work, table = WorkFolder(output, request), live_table_of(output)
-    work.require_output(overwrite)
+    inputs = Inputs(recording_files(recording))
+    work.require_output(overwrite, inputs)
     if not work.begun:
-        require_new(table, overwrite)
-        require_new(live_corrections_of(output), overwrite)
+        require_output(table, overwrite, inputs, LIVE_HEADER)
+        require_output(live_corrections_of(output), overwrite, inputs, ",".join(COLUMNS))
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         try:
             followed = _follow(job, folder, output, overwrite, reporter, publish)

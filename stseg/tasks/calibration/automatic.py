@@ -29,11 +29,12 @@ from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import write_rig
+from stseg.io.recording.source_files import recording_files
 from stseg.io.recording.video.ffmpeg import read_video_size
 
 Distance = tuple[str, float, float, float, float, float]
@@ -118,8 +119,9 @@ def calibrate_auto(
         Where a video cannot be read, or too few people walk where several cameras see them.
     """
     output, paths, reporter = Path(output), [Path(video) for video in videos], reporter_of(progress)
-    require_new(output, overwrite)
+    require_output(output, overwrite, Inputs(paths))
     streams = _streams(paths, output, frame_rate, background, source_kind)
+    require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
     stated_distance = None if distance is None else _known_distance(distance, names)
     counted = index_streams(streams)
@@ -145,7 +147,7 @@ def calibrate_auto(
             raise ConfigError("--distance", "", "a pixel above the horizon", "pixels that show the ground")
         solution = scaled(solution, factor)
     recording = _recording(output, streams, solution, cell)
-    write_rig(output, recording)
+    write_rig(output, recording, overwrite)
     points = solution.adjustment.parameters.points
     return AutomaticCalibration(
         recording, tuple(reports_of(solution)), len(points), float(np.median(points[:, 2])), floor_marks

@@ -18,9 +18,10 @@ from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.recordings import recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
-from stseg.io.outputs.whole_files import write_page
+from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
+from stseg.io.recording.source_files import recording_files
 from stseg.reporting.figures import Figure, backdrop
 from stseg.reporting.page.html import STYLE, figures, note, section, table
 from stseg.reporting.pictures.maps import blind_map
@@ -104,11 +105,12 @@ class RigCheck:
 
     def write_page(self, output: Path, overwrite: bool = False) -> None:
         """Write verdict and pictures as one HTML page, which holds images of the cameras."""
+        require_output(output, overwrite, Inputs(recording_files(self.recording)))
         write_page(output, _page(self), overwrite)
 
     def write_pictures(self, folder: Path, overwrite: bool = False) -> int:
         """Write the pictures as PNG files grid_CAMERA.png and coverage.png; their number."""
-        return len(write_figures(folder, self.pictures, overwrite))
+        return len(write_figures(folder, self.pictures, overwrite, Inputs(recording_files(self.recording))))
 
 
 def check_rig(

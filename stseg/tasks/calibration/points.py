@@ -18,7 +18,7 @@ from stseg.geometry import Grid, Rig
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.calibrations.world_frame import UNITS
 from stseg.io.calibrations.xml_files import read_opencv_lens
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
 
@@ -93,19 +93,21 @@ def calibrate_points(
         Where the points do not determine a camera, or the rig file cannot be written.
     """
     output = Path(output)
-    require_new(output, overwrite)
+    require_output(output, overwrite, Inputs([Path(points)]))
     tables, fits = read_points(Path(points)), list[PointFit]()
     for table in tables:
         if lens is not None and "{name}" not in lens:
             raise ConfigError("--lens", "", repr(lens), "a path with {name} in it")
-        known_lens = None if lens is None else read_opencv_lens(Path(lens.replace("{name}", table.camera)))
+        lens_file = None if lens is None else Path(lens.replace("{name}", table.camera))
+        require_output(output, overwrite, Inputs([lens_file]))
+        known_lens = None if lens_file is None else read_opencv_lens(lens_file)
         metres = table.place * UNITS[unit]
         fits.append(fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), known_lens))
         require_camera_height(fits[-1].camera, unit, UNITS)
     names = [table.camera for table in tables]
     rig = Rig(scene or output.stem, frame_rate, grid, tuple(fit.camera for fit in fits))
     recording = Recording(output, rig, tuple(map(camera_source, _sources(sources, names))))
-    write_rig(output, recording)
+    write_rig(output, recording, overwrite)
     warnings = tuple(words for fit in fits for words in fit_warnings(fit, grid))
     return PointCalibration(recording, tuple(table.line for table in tables), tuple(fits), warnings)
 

@@ -1,0 +1,128 @@
+"""Outputs replace neither inputs nor what stseg did not make: every command, with each of its files as its output."""
+
+import os
+from pathlib import Path
+from unittest.mock import Mock
+
+import cv2
+import numpy as np
+import pytest
+from recordings import write_recording
+from refusals import Command
+from run_files import write_small_run
+
+from stseg.commands.main import main
+from stseg.io.exports.archive import ARCHIVES
+from stseg.io.exports.formats import FORMATS, ExportFormat
+
+COMMANDS = {
+    "run rig.toml -o": ("rig.toml", "west.csv"),
+    "report run.h5 --truth truth.csv --names names.csv -o": ("run.h5", "truth.csv", "names.csv", "left.avi"),
+    "report run.h5 --video": ("left.avi",),
+    "export run.h5 --to csv --names names.csv -o": ("run.h5", "names.csv", "left.avi"),
+    "export run.h5 more.h5 --to sqlite -o": ("run.h5", "more.h5"),
+    "correct run.h5 answers.csv -o": ("run.h5", "answers.csv", "left.avi"),
+    "review run.h5 -o": ("run.h5", "left.avi"),
+    "inspect run.h5 --slice frame=11,plane=all -o": ("run.h5", "left.avi"),
+    "calibrate points points.csv --size 64,48 --area 0,0,4,3 --frame-rate 5 -o": ("points.csv",),
+    "calibrate import opencv lens.xml --size=640,480 --unit=mm --up=-z --frame-rate=5 --area=-1,0.5,1,3 -o": (
+        "lens.xml",
+    ),
+    "calibrate page photo.png --area 0,0,4,3 --plan plan.png -o": ("photo.png", "plan.png"),
+    "calibrate lens photo.png --board 5,4 -o": ("photo.png",),
+    "calibrate check rig.toml -o": ("rig.toml", "west.csv"),
+    "calibrate auto left.avi right.avi --frame-rate 5 -o": ("left.avi",),
+}
+"""Commands without their output, and their inputs."""
+
+
+@pytest.fixture
+def run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A run file, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    write_small_run(tmp_path / "run.h5")
+    return tmp_path
+
+
+@pytest.fixture
+def folder(run_folder: Path) -> Path:
+    """Inputs of all commands."""
+    write_recording(run_folder)
+    write_small_run(run_folder / "more.h5")
+    Path("truth.csv").write_text("frame,id,x,y\n11,1,0.2,0.2\n")
+    Path("names.csv").write_text("id,name\n1,Ada\n")
+    Path("answers.csv").write_text("action,track,other,frame,name\nname,1,,,Ada\n")
+    for name in ("right.avi", "points.csv", "lens.xml"):
+        Path(name).write_text("precious")
+    for name in ("photo.png", "plan.png"):
+        cv2.imwrite(name, np.zeros((48, 64, 3), np.uint8))
+    return run_folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_command_replaces_what_it_reads(
+    folder: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """By name, by another name of the same file, and through a link; be it ours or not."""
+    monkeypatch.setattr("stseg.io.outputs.whole_files._is_ours", lambda *_: True)
+    for name in COMMANDS[command]:
+        os.link(name, "hard.mp4")
+        Path("soft.mp4").symlink_to(name)
+        before = contents(folder)
+        for output in (name, "hard.mp4", "soft.mp4"):
+            if "--video" not in command or output != name:
+                said = refusal(*command.split(), output, "--overwrite")
+                assert output in said
+                assert "a file that is read here" in said
+        assert contents(folder) == before
+        Path("hard.mp4").unlink()
+        Path("soft.mp4").unlink()
+
+
+def test_pictures_and_tables_replace_nothing_foreign_in_their_folder(folder: Path, refusal: Command) -> None:
+    Path("west.png").write_bytes(Path("photo.png").read_bytes())
+    Path("zones.csv").write_text("zone,mine\n")
+    Path("plan.png").write_bytes(b"precious")
+    before = contents(folder)
+    for command in (
+        "inspect rig.toml -o .",
+        "measure run.h5 -o .",
+        "report run.h5 -o page.html --pictures .",
+        "calibrate check rig.toml --frames 0:2 --pictures west.png",
+    ):
+        refusal(*command.split(), "--overwrite")
+    assert before.items() <= contents(folder).items()
+
+
+@pytest.mark.parametrize("to", [*FORMATS, *ARCHIVES])
+@pytest.mark.usefixtures("run_folder")
+def test_an_export_is_replaced_by_its_like_alone(refusal: Command, to: str) -> None:
+    command = ("export", "run.h5", "--to", to, "-o", "out")
+    Path("out").write_text("frame,left,top,width,height\n0,1,2,3,4\n")
+    assert "did not make" in refusal(*command, "--overwrite")
+    Path("out").unlink()
+    assert main([*command]) == main([*command, "--overwrite"]) == 0
+
+
+@pytest.mark.parametrize("to", [*FORMATS, *ARCHIVES])
+@pytest.mark.usefixtures("run_folder")
+def test_an_export_without_its_rows_is_not_published(
+    refusal: Command, monkeypatch: pytest.MonkeyPatch, to: str
+) -> None:
+    """As by a disk that is full and says nothing."""
+    if to in ARCHIVES:
+        monkeypatch.setattr("stseg.io.exports.archive._fill", lambda database, _: filled(database))
+    else:
+        monkeypatch.setitem(FORMATS, to, ExportFormat(Mock(), ""))
+    assert "out" in refusal("export", "run.h5", "--to", to, "-o", "out")
+    assert not Path("out").exists()
+
+
+def filled(database: object) -> dict[str, int]:
+    """Tables that should hold a row."""
+    database.execute("CREATE TABLE recordings (recording TEXT)")  # type: ignore[attr-defined]
+    return {"recordings": 1}
