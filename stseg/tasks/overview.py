@@ -135,9 +135,16 @@ def _track_seconds(run: Run) -> dict[str, float]:
 def _warnings(run: Run, shares: list[float]) -> list[str]:
     if not len(run.frames):
         return ["there are no frames"]
-    warnings = [] if len(run.tracks) else ["no person was found"]
+    warnings = [] if len(run.tracks) else [_without_tracks(run)]
     if not run.views.any():
         warnings.append("no view sees any cell")
     elif shares[0] > _BLIND_SHARE:
         warnings.append(f"no view sees {100 * shares[0]:.0f} % of the ground")
     return warnings + run_warnings(run)
+
+
+def _without_tracks(run: Run) -> str:
+    dropped = int((run.events["kind"] == b"dropped").sum())
+    if not dropped:
+        return "no person was found"
+    return f"all {dropped} tracks were dropped: see /events, and tracking.minimum_duration for short recordings"
