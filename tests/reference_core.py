@@ -51,11 +51,10 @@ def away_from_border(open_to_people: Flags, cell: float) -> Floats:
     return away[1:-1, 1:-1]
 
 
-def kalman(state: Floats, covariance: Floats, place: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """The textbook's correction of x, y, vx, vy by a measured place."""
-    look = np.eye(2, 4)
-    gain = covariance @ look.T @ np.linalg.inv(look @ covariance @ look.T + noise)
-    return state + gain @ (place - look @ state), (np.eye(4) - gain @ look) @ covariance
+def kalman(state: Floats, covariance: Floats, place: Floats, noise: Floats, matrix: Floats) -> tuple[Floats, Floats]:
+    """The textbook's correction of a state by a measured place."""
+    gain = covariance @ matrix.T @ np.linalg.inv(matrix @ covariance @ matrix.T + noise)
+    return state + gain @ (place - matrix @ state), (np.eye(len(state)) - gain @ matrix) @ covariance
 
 
 Edge = tuple[int, int, int]

@@ -21,7 +21,7 @@ from stseg.config import MotionConfig, TrackingConfig
 from stseg.geometry.distances import distances
 from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import TRAJECTORY
-from stseg.tracking.filter.motion_model import process_noise, transition
+from stseg.tracking.filter.motion_model import augmented_noise, augmented_transition
 from stseg.tracking.filter.track_filter import EXCLUSION_RADIUS
 from stseg.tracking.row_groups import rows_of_tracks
 
@@ -184,9 +184,6 @@ def _by_turn(tracks: Sequence[Ints]) -> tuple[Ints, Ints]:
 def _motions(seconds: Floats, model: MotionConfig) -> tuple[Floats, Floats]:
     """Transitions and process noise over some times (n,), float64 (n, 6, 6)."""
     steps, which = np.unique(seconds, return_inverse=True)
-    motions, noises = np.zeros((2, len(steps), 6, 6))
-    for motion, noise, step in zip(motions, noises, steps.tolist(), strict=True):
-        kept = np.exp(-step / PLACE_ERROR.seconds)
-        motion[:4, :4], motion[4:, 4:] = transition(step), kept * np.eye(2)
-        noise[:4, :4], noise[4:, 4:] = process_noise(step, model), (1.0 - kept**2) * np.eye(2)
+    motions = np.array([augmented_transition(step) for step in steps.tolist()]).reshape(-1, 6, 6)
+    noises = np.array([augmented_noise(step, model) for step in steps.tolist()]).reshape(-1, 6, 6)
     return motions[which], noises[which]

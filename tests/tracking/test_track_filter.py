@@ -21,7 +21,7 @@ from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.people import People
 from stseg.records.sizes import Sizes
 from stseg.tracking.filter.motion_model import process_noise, transition
-from stseg.tracking.filter.track_filter import Measurement, PlacePosterior, TrackFilter, TrackState
+from stseg.tracking.filter.track_filter import BodyPlace, Measurement, PlacePosterior, TrackFilter, TrackState
 from stseg.trajectories.smoother import smoothed_paths
 
 RATE = 8.0
@@ -35,9 +35,9 @@ STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2
 
 
 def track_state(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> TrackState:
-    spread = np.diag([0.03, 0.02, 0.6, 0.5])
+    spread = np.diag([0.03, 0.02, 0.6, 0.5, 1.0, 0.9])
     spread[0, 2] = spread[2, 0] = spread[1, 3] = spread[3, 1] = 0.05
-    return TrackState(3, 10, np.array(state), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
+    return TrackState(3, 10, np.array([*state, 0.2, -0.1]), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
 
 
 # One track
@@ -47,8 +47,8 @@ def track_state(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1
 def test_constant_velocity(state: Floats, first: float, second: float) -> None:
     track = track_state(tuple(state))
     then = track.predicted(first, CONFIG.motion)
-    np.testing.assert_allclose(then.state, [*(state[:2] + first * state[2:]), *state[2:]])
-    assert (np.linalg.eigvalsh(then.covariance - np.diag([0, 0, 0.6, 0.5])).sum()) > 0
+    np.testing.assert_allclose(then.state[:4], [*(state[:2] + first * state[2:]), *state[2:]])
+    assert (np.linalg.eigvalsh(then.covariance[:4, :4] - np.diag([0, 0, 0.6, 0.5])).sum()) > 0
     at_once, in_steps = track.predicted(first + second, CONFIG.motion), then.predicted(second, CONFIG.motion)
     np.testing.assert_allclose(at_once.state, in_steps.state, atol=1e-9)
     np.testing.assert_allclose(at_once.covariance, in_steps.covariance, atol=1e-9)
@@ -58,21 +58,24 @@ def test_constant_velocity(state: Floats, first: float, second: float) -> None:
 @settings(deadline=None)
 @given(STATES, numbers(-1, 1), numbers(-1, 1), numbers(0.02, 0.5), numbers(-0.8, 0.8), numbers(0, 0.1))
 def test_a_correction_is_the_textbooks(state: Floats, x: float, y: float, sd: float, slant: float, q: float) -> None:
-    """A posterior of the body's place under its prediction holds all of a measurement of noise R + q I."""
+    """A posterior of the body's place under its prediction holds all of a measurement of the body."""
     track = track_state(tuple(state)).predicted(0.3, CONFIG.motion)
     noise = sd**2 * np.array([[1.0, slant], [slant, 1.0]])
-    place, prior = track.state[:2] + np.array([x, y]), track.covariance[:2, :2] + q * np.eye(2)
+    body = BodyPlace.of(float(np.sqrt(q)))
+    place, prior = body.ground(track.state) + np.array([x, y]), body.covariance(track.covariance)
     posterior = np.linalg.inv(np.linalg.inv(prior) + np.linalg.inv(noise))
-    mean = posterior @ (np.linalg.solve(prior, track.state[:2]) + np.linalg.solve(noise, place))
-    after = track.corrected(11, PlacePosterior(mean, posterior, q), NOTHING, NOTHING)
-    expected, covariance = reference.kalman(track.state, track.covariance, place, noise + q * np.eye(2))
+    mean = posterior @ (np.linalg.solve(prior, body.ground(track.state)) + np.linalg.solve(noise, place))
+    after = track.corrected(11, PlacePosterior(mean, posterior, body), NOTHING, NOTHING)
+    white = noise + body.white * np.eye(2)
+    expected, covariance = reference.kalman(track.state, track.covariance, place, white, body.matrix)
     np.testing.assert_allclose(after.state, expected, atol=1e-8)
     np.testing.assert_allclose(after.covariance, covariance, atol=1e-8)
 
 
 def unchanged_place(track: TrackState) -> PlacePosterior:
     """The posterior of a frame that shows no place."""
-    return PlacePosterior(track.state[:2], track.covariance[:2, :2], 0.0)
+    body = BodyPlace.of(0.15)
+    return PlacePosterior(body.ground(track.state), body.covariance(track.covariance), body)
 
 
 def test_a_posterior_that_says_nothing_new_changes_nothing() -> None:
@@ -154,7 +157,7 @@ def test_who_walks_on_is_expected_where_they_will_be() -> None:
         there = np.array([[-3 + 1.2 * ahead / RATE, 1 - 0.4 * ahead / RATE]])
         np.testing.assert_allclose(expected.ground, there, atol=0.03)
     (track,) = track_filter.tracks
-    np.testing.assert_allclose(track.state[2:], [1.2, -0.4], atol=0.03)
+    np.testing.assert_allclose(track.state[2:4], [1.2, -0.4], atol=0.03)
 
 
 @pytest.mark.parametrize("order", range(3))
@@ -344,12 +347,12 @@ def test_innovations_are_as_large_as_claimed(squares: Callable[[Floats, Floats],
     assert found.mean() == pytest.approx(2.0, abs=4 * 2 / np.sqrt(found.size))
 
 
-def lasting_errors(noise: Floats) -> Floats:
-    """Errors of which a part lasts, by the constants of places, float64 (walk, step, 2)."""
-    rng, kept = np.random.default_rng(7), np.exp(-SECONDS / PLACE_ERROR.seconds)
-    lasting = rng.normal(size=(WALKS, STEPS, 2))
-    for step in range(1, STEPS):
-        lasting[:, step] = kept * lasting[:, step - 1] + np.sqrt(1 - kept**2) * lasting[:, step]
+def lasting_errors(noise: Floats, people: int, frames: int, seconds: float) -> Floats:
+    """Errors of which a part lasts, by the constants of places, float64 (person, frame, 2)."""
+    rng, kept = np.random.default_rng(7), np.exp(-seconds / PLACE_ERROR.seconds)
+    lasting = rng.normal(size=(people, frames, 2))
+    for frame in range(1, frames):
+        lasting[:, frame] = kept * lasting[:, frame - 1] + np.sqrt(1 - kept**2) * lasting[:, frame]
     white = rng.normal(size=lasting.shape)
     both = np.sqrt(PLACE_ERROR.lasting) * lasting + np.sqrt(PLACE_ERROR.white) * white
     return np.asarray(both @ np.linalg.cholesky(noise).T)
@@ -360,7 +363,7 @@ def test_smoothed_places_err_by_as_much_as_claimed() -> None:
     true = walks(NOISE)[0]
     seconds = np.asarray(np.arange(STEPS) * SECONDS, np.float64)
     noise = np.asarray(np.tile(NOISE, (STEPS, 1, 1)), np.float64)
-    measured = true + lasting_errors(NOISE)
+    measured = true + lasting_errors(NOISE, WALKS, STEPS, SECONDS)
     paths = [smoothed_paths(seconds, path, noise, [np.arange(STEPS)], MOTION) for path in measured]
     squares = [
         [square(*one) for one in zip(path[0] - real, path[1], strict=True)]
@@ -374,7 +377,7 @@ def test_smoothed_places_err_by_as_much_as_claimed() -> None:
 # Consistency of the filter in its use
 
 
-PEOPLE = 60
+PEOPLE, FRAMES = 60, 45
 """People who are followed at the same time."""
 
 
@@ -395,9 +398,10 @@ def test_the_filter_is_as_right_as_it_is_sure(rate: float, detector_noise: float
     config = replace(CONFIG, motion=replace(MOTION, position_noise=place_noise))
     rng, noise, track_filter = np.random.default_rng(3), detector_noise**2 * np.eye(2), TrackFilter(rate, config)
     state = np.append(rng.normal(0, 300, (PEOPLE, 2)), rng.normal(0, MOTION.speed_spread, (PEOPLE, 2)), axis=1)
+    strays = lasting_errors(place_noise**2 * np.eye(2), PEOPLE, FRAMES, 1 / rate)
     errors, claimed = [], []
-    for frame in range(45):
-        shown = state[:, :2] + rng.normal(0, np.hypot(detector_noise, place_noise), (PEOPLE, 2))
+    for frame in range(FRAMES):
+        shown = state[:, :2] + strays[:, frame] + rng.normal(0, detector_noise, (PEOPLE, 2))
         predicted = track_filter.predict(frame)
         ground, covariance, index = shown, np.tile(noise, (PEOPLE, 1, 1)), np.full(PEOPLE, -1)
         if predicted is not None:
@@ -406,8 +410,8 @@ def test_the_filter_is_as_right_as_it_is_sure(rate: float, detector_noise: float
             covariance, index = predicted.covariance - gain @ predicted.covariance, np.arange(PEOPLE)
         track_filter.update(frame, detections(ground, covariance, index), GHOSTS)
         if frame >= 15:
-            errors.append([track.state - true for track, true in zip(track_filter.tracks, state, strict=True)])
-            claimed.append([track.covariance for track in track_filter.tracks])
+            errors.append([track.state[:4] - true for track, true in zip(track_filter.tracks, state, strict=True)])
+            claimed.append([track.covariance[:4, :4] for track in track_filter.tracks])
         noises = rng.multivariate_normal(np.zeros(4), process_noise(1 / rate, MOTION), PEOPLE)
         state = state @ transition(1 / rate).T + noises
     error, spread = np.array(errors).reshape(-1, 4), np.array(claimed).reshape(-1, 4, 4)

@@ -15,10 +15,11 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import Config, MotionConfig
 from stseg.geometry.distances import distances
+from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.people import People
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
-from stseg.tracking.filter.motion_model import process_noise, transition
+from stseg.tracking.filter.motion_model import augmented_noise, augmented_transition
 
 _SIZE_DRIFT = 0.002
 """Random walk of a person's apparent height and width, metres per square root of a second: shoes, stoop, lens."""
@@ -44,11 +45,36 @@ class Measurement(NamedTuple):
 
 
 class PlacePosterior(NamedTuple):
-    """Posterior of a body's place, float64 (2,), (2, 2), metres, and the variance of a body about its track's place."""
+    """Posterior of a body's place, float64 (2,), (2, 2), metres, and the prior that is in it."""
 
     ground: Floats
     covariance: Floats
-    noise: float
+    prior: BodyPlace
+
+
+class BodyPlace(NamedTuple):
+    """A body's place by a track's state: `matrix` float64 (2, 6) times the state, and white noise, square metres.
+
+    Where detectors put a body strays from the track, and most of that lasts: pose, gait and the views that see it.
+    """
+
+    matrix: Floats
+    white: float
+
+    @classmethod
+    def of(cls, noise: float) -> BodyPlace:
+        """The place of bodies that stray by a standard deviation, metres."""
+        lasting = noise * np.sqrt(PLACE_ERROR.lasting) * np.eye(2)
+        matrix = np.concatenate([np.eye(2), np.zeros((2, 2)), lasting], axis=1)
+        return cls(matrix, float(PLACE_ERROR.white) * noise**2)
+
+    def ground(self, state: Floats) -> Floats:
+        """The place by a state, float64 (2,), metres."""
+        return np.asarray(self.matrix @ state)
+
+    def covariance(self, covariance: Floats) -> Floats:
+        """Its covariance by that of a state, float64 (2, 2), square metres."""
+        return np.asarray(self.matrix @ covariance @ self.matrix.T + self.white * np.eye(2))
 
 
 class TrackState(NamedTuple):
@@ -60,8 +86,9 @@ class TrackState(NamedTuple):
         Number, from 1; 0 for a tentative track: a candidate that was rejected, but may be confirmed later.
     last_seen
         Frame of the last detection.
-    state, covariance : float64 (4,), (4, 4)
-        x, y, vx, vy in metres and metres per second.
+    state, covariance : float64 (6,), (6, 6)
+        x, y, vx, vy in metres and metres per second, and the lasting part of the body's stray, in its own standard
+        deviations (`stseg.tracking.filter.motion_model`).
     height, height_variance, width, width_variance
         Metres, square metres.
     odds
@@ -80,10 +107,10 @@ class TrackState(NamedTuple):
 
     def predicted(self, seconds: float, model: MotionConfig) -> TrackState:
         """The state some seconds after the last detection."""
-        motion = transition(seconds)
+        motion = augmented_transition(seconds)
         return self._replace(
             state=motion @ self.state,
-            covariance=motion @ self.covariance @ motion.T + process_noise(seconds, model),
+            covariance=motion @ self.covariance @ motion.T + augmented_noise(seconds, model),
             height_variance=self.height_variance + _SIZE_DRIFT**2 * seconds,
             width_variance=self.width_variance + _SIZE_DRIFT**2 * seconds,
         )
@@ -91,9 +118,9 @@ class TrackState(NamedTuple):
     def corrected(self, frame: int, place: PlacePosterior, height: Measurement, width: Measurement) -> TrackState:
         """The predicted state after a detection.
 
-        The body's place b strays from that of the track, N(b; x, q I), and the detector gives the posterior of b under
-        the prior N(x, P + q I) of this prediction. Given b the measurement says nothing more, so mean and covariance of
-        the state follow from those of b by its regression on b (Bar-Shalom, Li and Kirubarajan 2001, section 1.4.14).
+        The body's place is b = H s + noise of the state s, and the detector gives the posterior of b under the prior of
+        this prediction. Given b the measurement says nothing more, so mean and covariance of the state follow from
+        those of b by its regression on b (Bar-Shalom, Li and Kirubarajan 2001, section 1.4.14).
 
         Parameters
         ----------
@@ -104,12 +131,12 @@ class TrackState(NamedTuple):
         height, width
             Measurements, without this prediction as their prior.
         """
-        prior = self.covariance[:2, :2] + place.noise * np.eye(2)
-        gain = self.covariance[:, :2] @ np.linalg.inv(prior)
+        prior = place.prior.covariance(self.covariance)
+        gain = self.covariance @ place.prior.matrix.T @ np.linalg.inv(prior)
         surplus = prior - place.covariance
         return self.resized(height, width)._replace(
             last_seen=frame,
-            state=self.state + gain @ (place.ground - self.state[:2]),
+            state=self.state + gain @ (place.ground - place.prior.ground(self.state)),
             covariance=self.covariance - gain @ surplus @ gain.T,
         )
 
@@ -140,6 +167,7 @@ class TrackFilter:
         self.frame_rate = frame_rate
         self.body, self.motion = config.body, config.motion
         self.config, self.birth_log_odds = config.tracking, config.detection.prior_log_odds
+        self.body_place = BodyPlace.of(config.motion.position_noise)
         self.tracks: list[TrackState] = []
         self.issued = 0
         self.begun = False
@@ -152,8 +180,8 @@ class TrackFilter:
             return None
         predicted = self._predictions(frame)
         return PredictedTracks(
-            np.array([t.state[:2] for t in predicted]).reshape(-1, 2),
-            np.array([t.covariance[:2, :2] for t in predicted]).reshape(-1, 2, 2) + self._place_noise,
+            self._grounds(predicted),
+            np.array([self.body_place.covariance(t.covariance) for t in predicted]).reshape(-1, 2, 2),
             Sizes(
                 np.array([t.height for t in predicted]),
                 np.array([t.height_variance for t in predicted]) + self.config.height_noise**2,
@@ -173,11 +201,11 @@ class TrackFilter:
         """
         self.begun = True
         heights, widths = self._measured(people)
-        predicted, noise = self._predictions(frame), self.motion.position_noise**2
-        names, detected = np.zeros(len(people), np.int64), []
+        predicted = self._predictions(frame)
+        names, detected = np.zeros(len(people), np.int64), list[TrackState]()
         for j, index in enumerate(people.track_index.tolist()):
             if index >= 0:
-                place = PlacePosterior(people.ground[j], people.covariance[j], noise)
+                place = PlacePosterior(people.ground[j], people.covariance[j], self.body_place)
                 track, before = predicted[index].corrected(frame, place, heights[j], widths[j]), predicted[index].odds
             else:
                 track, before = self._birth(frame, people, j).resized(heights[j], widths[j]), self.birth_log_odds
@@ -187,8 +215,8 @@ class TrackFilter:
             detected.append(track._replace(track=track.track or self.issued, odds=odds))
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
-        standing = [track.state[:2] for track in detected] + [predicted[k].state[:2] for k in missed]
-        tentative = self._tentative(frame, ghosts, np.array(standing).reshape(-1, 2))
+        standing = self._grounds([*detected, *(predicted[k] for k in missed)])
+        tentative = self._tentative(frame, ghosts, standing)
         self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
         return names
@@ -208,9 +236,9 @@ class TrackFilter:
             _measurements(sizes.width, sizes.width_variance, prior.width_spread, noise.width_noise),
         )
 
-    @property
-    def _place_noise(self) -> Floats:
-        return np.eye(2) * self.motion.position_noise**2
+    def _grounds(self, tracks: list[TrackState]) -> Floats:
+        """Where bodies of tracks are expected, float64 (n, 2), metres."""
+        return np.array([self.body_place.ground(track.state) for track in tracks]).reshape(-1, 2)
 
     def _predictions(self, frame: int) -> list[TrackState]:
         """All tracks as predicted for a frame, in their order; made once a frame."""
@@ -236,10 +264,12 @@ class TrackFilter:
 
     def _birth(self, frame: int, people: People, j: int) -> TrackState:
         """The prior of a new track: near the place, sizes of the population, any velocity."""
-        spread = np.diag([0.0, 0.0, self.motion.speed_spread**2, self.motion.speed_spread**2])
-        spread[:2, :2] = people.covariance[j] + self._place_noise
-        state = np.append(people.ground[j], [0.0, 0.0])
-        prior = self.body
+        # The body stands there: the place of the track is that less the stray, of which nothing is known.
+        spread = np.diag([0.0, 0.0, self.motion.speed_spread**2, self.motion.speed_spread**2, 1.0, 1.0])
+        stray = self.body_place.matrix[:, 4:]
+        spread[:2, :2] = people.covariance[j] + self.body_place.white * np.eye(2) + stray @ stray.T
+        spread[:2, 4:] = spread[4:, :2] = -stray
+        state, prior = np.append(people.ground[j], np.zeros(4)), self.body
         sizes = (prior.height_mean, prior.height_spread**2, prior.width_mean, prior.width_spread**2)
         return TrackState(0, frame, state, spread, *sizes, 0.0)
 
