@@ -25,7 +25,7 @@ STAGES: dict[str, set[str]] = {
     "detection": {"view_health", "noise"},
     "occupancy": set(),
     "segmentation": {SOLVER},
-    "tracking": set(),
+    "tracking": {"noise"},
     "identities": {"noise", "tracking"},
     "trajectories": {"noise", "tracking", "identities"},
     "pixel_labels": {SOLVER},
