@@ -97,7 +97,7 @@ def pillar_range(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, 
 @kernel
 def fill_fits(
     index: PillarIndex,
-    bodies: Floats,
+    bodies: Floats | Singles,
     box: Floats,
     tolerance: Floats,
     belief: float,

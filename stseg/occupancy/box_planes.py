@@ -20,13 +20,16 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
-from stseg.bodies.box_fit import MATCH_LIMIT, half_square
-from stseg.bodies.pillar_index import PillarIndex, pillar_range
+from stseg.bodies.box_fit import half_square
+from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.kernels.accelerate import kernel
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.shown_cells import ShownCells
+
+_LEAST_FIT = 18.0
+"""A box that fits a pillar by this much worse than perfectly is none, nats: it would raise L by less than a level."""
 
 
 class ViewBoxes(NamedTuple):
@@ -98,7 +101,7 @@ def fill_fit(
         Log-prior of the height at cells near no person, and near each person. The second is centred on the person's
         estimated height, so that an unusual height costs nothing again in every view.
     """
-    ground_cells = fit.shape[1]
+    ground_cells, pillar, match = fit.shape[1], np.empty(len(index.order), np.int32), np.empty(len(index.order))
     fit[:] = -np.inf
     for b in range(len(boxes.edges)):
         box, tolerance, person = boxes.edges[b], boxes.tolerance[b], boxes.person[b]
@@ -106,18 +109,18 @@ def fill_fit(
             for k in range(cells.start[person], cells.start[person + 1]):
                 for h in range(len(height_prior)):
                     body = pillars[h * ground_cells + cells.cell[k]]
-                    match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
-                    log_fit = np.float32(person_prior[person, h] + match)
+                    own_match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
+                    log_fit = np.float32(person_prior[person, h] + own_match)
                     fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
             continue
-        for kind in range(len(index.tallest)):
-            first, stop = pillar_range(index, kind, box, tolerance, MATCH_LIMIT)
-            for k in range(first, stop):
-                h, cell = index.order[k] // ground_cells, index.order[k] % ground_cells
-                body = pillars[index.order[k]]
-                match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
-                prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]
-                fit[h, cell] = max(fit[h, cell], np.float32(prior + match))
+        number = fill_fits(
+            index, pillars, box, tolerance, boxes.belief[b], boxes.width, boxes.height, boxes.belief[b] - _LEAST_FIT,
+            pillar, match,
+        )  # fmt: skip
+        for k in range(number):
+            h, cell = pillar[k] // ground_cells, pillar[k] % ground_cells
+            prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]
+            fit[h, cell] = max(fit[h, cell], np.float32(prior + match[k]))
 
 
 @kernel
