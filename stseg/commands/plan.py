@@ -31,12 +31,12 @@ def plan(
     workers: int | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> None:
-    """Say how long a run will take and how large its file will be, from ten seconds of this recording.
+    """Say how long a run will take and how large its file will be, from a few frames of this recording.
 
     Example: stseg plan rig.toml --workers 4
 
-    It counts the recording, as the run will, and tracks three short parts of it. The other options are those of stseg
-    run. Workers are taken to have a core each.
+    It counts the recording, as the run will, and tracks frames at four places of it. The other options are those of
+    stseg run. Workers are taken to have a core each.
 
     Parameters
     ----------

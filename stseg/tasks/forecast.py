@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, process_time
 
 from stseg.config import Config
 from stseg.config.keys import require_effect
@@ -21,13 +22,14 @@ from stseg.engine.workers.workforce import Workforce
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.layout import VolumeKind
+from stseg.tracking.windows.windows import window_length
 
-_SECONDS = 10.0
-"""Duration of all tried parts, seconds."""
-_PLACES = 3
-"""Number of tried parts."""
+_PLACES = 4
+"""Number of tried parts, spread over the recording: where few people are, and where many are."""
+_FRAMES = 12
+"""Frames of each, so that all take no longer than a few seconds."""
 _READY = 4
-"""Frames that are tracked first, so that no kernel is compiled while the clock runs."""
+"""First frames of a part that do not count: kernels are loaded, and frames without tracks cost more than others."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class Forecast:
     frames, segments, workers
         Of the run, of which each segment is made by one worker.
     counting, learning, tracking, joining
-        Seconds of work: decoding all streams once, learning backgrounds, making all segments, writing the run file.
+        Seconds of work of one core: counting all streams, learning backgrounds, making all segments, writing the run
+        file.
     file_bytes
         Size of the run file; the folder of segments beside it takes as much until it stands.
     """
@@ -72,7 +75,7 @@ def plan(
 ) -> Forecast:
     """Forecast the time of a run and the size of its file, as `stseg plan` does.
 
-    The recording is counted, and three short parts of it are tracked.
+    The recording is counted, and a few frames of it are tracked.
 
     Parameters
     ----------
@@ -101,38 +104,48 @@ def plan(
 
 
 def forecast(job: Job, counting: float, workers: int) -> Forecast:
-    """Forecast of a job, from parts of it that are tracked now; `counting` is in seconds."""
-    work, cuts = SegmentWorker(job), job.segments()
-    frames = sum(segment.stop - segment.first for segment in cuts)
-    parts = list(_parts(job))
-    tried = sum(len(range(part.first, part.stop)) for part in parts)
+    """Forecast of a job, from parts of it that are tracked now; `counting` is in seconds.
+
+    Processor time is measured, of all threads together: workers have a core each.
+    """
+    work, cuts, parts = SegmentWorker(job), job.segments(), list(_parts(job))
+    work.ends = [part.stop for part in parts]
+    tracking, learning, made = list[float](), list[float](), list[FinishedSegment]()
     with TemporaryDirectory() as name:
         folder = Path(name)
-        work.make(replace(parts[0], stop=min(parts[0].first + _READY, job.stop)), folder / "ready.h5", lambda _: None)
-        tracking, learning, made, fused = 0.0, list[float](), list[FinishedSegment](), list[int]()
+        ready = replace(parts[0], stop=min(parts[0].first + _READY, parts[0].stop))
+        work.make(ready, folder / "ready.h5", lambda _: None)
         for part in parts:
-            begin = perf_counter()
+            clock = [process_time()]
             work.foregrounds(part)
-            learned_at = perf_counter()
-            made.append(FinishedSegment(part, work.make(part, folder / f"{part.index}.h5", fused.append)))
-            learning.append(learned_at - begin)
-            tracking += perf_counter() - learned_at
-        begin = perf_counter()
+            learning.append(process_time() - clock[0])
+            clock = [process_time()]
+            path = work.make(part, folder / f"{part.index}.h5", partial(_note_time, clock))
+            made.append(FinishedSegment(part, path))
+            skipped = min(_READY, len(clock) - 2)
+            tracking.append((process_time() - clock[skipped]) / (len(clock) - 1 - skipped))
+        begin = process_time()
         assemble(job, made, folder / "run.h5")
-        joining, size = perf_counter() - begin, (folder / "run.h5").stat().st_size
-    # A segment is processed until its last window is solved: much of a short part, and little of a long one.
-    excess = (len(fused) - tried) / len(parts)
+        joining, size = process_time() - begin, (folder / "run.h5").stat().st_size
+    rate, tried = job.recording.rig.frame_rate, sum(part.stop - part.first for part in parts)
+    frames = sum(segment.stop - segment.first for segment in cuts)
+    excess = window_length(rate, job.config.tracking)[0]  # a segment is processed until its last window is solved
     processed = sum(segment.stop - segment.lead + excess for segment in cuts)
-    learned = -(-frames // round(job.config.segments.background_period * job.recording.rig.frame_rate))
+    learned = -(-frames // round(job.config.segments.background_period * rate))
     return Forecast(
-        frames, len(cuts), workers, counting, max(learning) * learned, tracking / len(fused) * processed,
+        frames, len(cuts), workers, counting, max(learning) * learned, sum(tracking) / len(parts) * processed,
         joining / tried * frames, round(size / tried * frames),
     )  # fmt: skip
 
 
+def _note_time(clock: list[float], _: int) -> None:
+    """Append the processor time after a further frame."""
+    clock.append(process_time())
+
+
 def _parts(job: Job) -> list[Segment]:
     """Short parts spread over the run, without a warm-up."""
-    total, length = job.stop - job.first, max(1, round(_SECONDS / _PLACES * job.recording.rig.frame_rate))
-    length = min(length, max(1, total // _PLACES))
+    total = job.stop - job.first
+    length = min(_FRAMES, max(1, total // _PLACES))
     begins = [job.first + (total - length) * place // (_PLACES - 1) for place in range(_PLACES)]
     return [Segment(k, begin, begin, begin + length) for k, begin in enumerate(begins) if k == 0 or total > _PLACES]

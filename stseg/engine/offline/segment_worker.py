@@ -26,11 +26,16 @@ class SegmentWorker:
         The run.
     cores
         Processor cores for this worker, asked at each frame; see `run_session`.
+
+    Attributes
+    ----------
+    ends
+        Frames beyond which no segment before them is read, rising.
     """
 
     def __init__(self, job: Job, cores: Callable[[], int] = two_cores) -> None:
         self.job, self.pipeline, self.cores = job, job.pipeline(), cores
-        self._ends = [*(begin for begin, _ in job.gaps()), job.stop]
+        self.ends = [*(begin for begin, _ in job.gaps()), job.stop]
         self._learned = list[ViewForeground]()
         self._learned_from: BackgroundFrames | None = None
 
@@ -57,7 +62,7 @@ class SegmentWorker:
             advance(int(segment.first <= frame < segment.stop))
 
         foregrounds = self.foregrounds(segment)
-        end = min(end for end in self._ends if end >= segment.stop)
+        end = min(end for end in self.ends if end >= segment.stop)
         with (
             open_frames(job.read, segment.lead, end, job.streams) as frame_sets,
             SegmentWriter(job, segment, self.pipeline.occupancy.views, draft) as writer,
