@@ -70,12 +70,14 @@ def workloads() -> list[Workload]:
     video = replace(NAMED["easy"], seconds=6.0, frame_rate=15.0, size=(720, 576))
     crowd = replace(NAMED["dense"], seconds=4.0, frame_rate=7.5)
     plaza = replace(NAMED["easy"], area=(20.0, 20.0), camera_distance=16.0, cameras=7, people=10, seconds=6.0, seed=8)
+    square = replace(NAMED["plaza"], area=(29.0, 37.0), camera_distance=30.0, people=35, seconds=3.0, stay=60.0)
     return [
         Workload("small", small, "rig.toml", 10, 240),
         Workload("video", video, "rig.toml", 30, 90),
         Workload("boxes", crowd, "rig_boxes.toml", 10, 30),
         Workload("masks", crowd, "rig_masks.toml", 10, 30),
         Workload("plaza", plaza, "rig_masks.toml", 20, 50),
+        Workload("crowd", square, "rig_masks.toml", 5, 15),
         Workload("start", small, "rig.toml", 2, None),
     ]
 
