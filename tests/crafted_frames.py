@@ -9,7 +9,7 @@ import reference_core as reference
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters, no_rows
 from stseg.detection.score.scoring import set_score
-from stseg.detection.search.best_set import ENUMERATION_LIMIT, find_best_set
+from stseg.detection.search.best_set import ENUMERATION_LIMIT, GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import COMPILED
 
 MAP_TYPE: type[np.float32] = np.float32 if COMPILED else np.float64  # type: ignore[assignment]
@@ -46,12 +46,15 @@ class CraftedFrame:
         return set_score(chosen, len(chosen), self.problem())
 
     def best_set(
-        self, start: Sequence[int] = (), sweeps: int = 4, enumeration_limit: int = ENUMERATION_LIMIT
+        self,
+        start: Sequence[int] = (),
+        sweeps: int = 4,
+        enumeration_limit: int = ENUMERATION_LIMIT,
     ) -> list[int]:
         """The set that the search ends with."""
         members = np.zeros(len(self.size_prior) + 1, np.int64)
         members[: len(start)] = start
-        count = find_best_set(members, len(start), self.problem(), enumeration_limit, sweeps)
+        count, _ = find_best_set(members, len(start), self.problem(), enumeration_limit, sweeps, GAIN_LIMIT)
         return sorted(members[:count].tolist())
 
 

@@ -48,6 +48,7 @@ def explained_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:
         tuple(view.step for view in views),
         tuple(estimate.box_assignment),
         np.full(len(views), np.nan),
+        estimate.unfinished,
     )
 
 

@@ -33,7 +33,7 @@ from stseg.engine.pipeline import Pipeline
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
-from stseg.records.tables import SHIFT
+from stseg.records.tables import EVENT, SHIFT
 from stseg.trackers import Commit, FrameObservations, FusedFrame
 from stseg.view_health.blind_views import ExcludedViews, FrozenViews
 from stseg.view_health.image_shifts import image_shifts, shift_is_due
@@ -112,6 +112,9 @@ class Session:
             proposed = source.of(failures.kept(evidence), self._fuse_with_current_rates) if source else None
             explanation = self.pipeline.detector.explain_next(self._estimates, frame, evidence, predicted, proposed)
         events = self._excluded.events(frame, frame_set.views, evidence, failures)
+        if explanation.unfinished:
+            reason = f"{explanation.unfinished} candidates interact: not searched to the end"
+            events = np.append(events, np.array([(frame, b"crowd", 0, 0, reason.encode())], EVENT))
         used = failures.kept(evidence)
         fusion = self._submit(frame, used, explanation, noise)
         with self.watch.time("appearance"):

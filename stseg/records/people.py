@@ -61,6 +61,8 @@ class Explanation:
     residual: Floats
     """float64 (view,): reprojection residual, metres (see `stseg.view_health.reprojection_residuals`); nan where
     nothing was measured."""
+    unfinished: int = 0
+    """Candidates of the largest group that was not searched to the end, 0 for none."""
 
 
 def empty_explanation(rig: Rig, evidence: Sequence[ViewEvidence]) -> Explanation:

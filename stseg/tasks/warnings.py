@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, Rows
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run
 from stseg.view_health.knock_detection import find_knocks, find_residual_step, views_off
@@ -21,6 +21,7 @@ def run_warnings(run: Run) -> list[str]:
         *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
         *body_warnings(run.cameras, run.trajectory, run.rates, body),
         *rig_warnings(run),
+        *crowd_warnings(run.events),
     ]
 
 
@@ -41,6 +42,15 @@ def rig_warnings(run: Run) -> list[str]:
         also = "".join(f", {other} it" for other in others)
         return [f"view {first} where the views put them{also}; see stseg calibrate check"]
     return []
+
+
+def crowd_warnings(events: Rows) -> list[str]:
+    """One sentence on frames whose search for people was not finished, by EVENT rows (n,)."""
+    crowds = events[events["kind"] == b"crowd"]
+    if not len(crowds):
+        return []
+    frame, reason = crowds["frame"][0], crowds["reason"][0].decode()
+    return [f"the search for people was cut short in {len(crowds)} frames, first in frame {frame}: {reason}"]
 
 
 def _moved(run: Run) -> list[str]:

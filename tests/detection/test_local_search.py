@@ -20,7 +20,7 @@ from stseg.detection.evidence.birth_lattice import lattice_candidates
 from stseg.detection.explanation import explained_frame
 from stseg.detection.prior import Prior
 from stseg.detection.score.set_state import set_state
-from stseg.detection.search.best_set import ENUMERATION_LIMIT
+from stseg.detection.search.best_set import ENUMERATION_LIMIT, GAIN_LIMIT, find_best_set
 from stseg.detection.search.groups import fill_groups, mark_interacting
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.merge_moves import merged
@@ -69,6 +69,15 @@ def test_of_more_candidates_swaps_find_the_best_set(tracks: int) -> None:
     np.testing.assert_allclose(swapped, best, atol=1e-6)
     assert (simple < best - 1e-6).any()
     assert (simple > best - 2.6).all()
+
+
+@pytest.mark.parametrize("limit", [0, 5, 20])
+def test_a_search_that_ends_at_its_limit_loses_nothing(limit: int) -> None:
+    frame, members = random_frame(3, 10, 2), np.arange(11)
+    count, unfinished = find_best_set(members, 3, frame.problem(), 0, 4, limit)
+    assert unfinished == 10
+    assert frame.score(members[:count]) >= frame.score(range(3))
+    assert find_best_set(np.arange(11), 3, frame.problem(), 0, 4, GAIN_LIMIT)[1] == 0
 
 
 @pytest.mark.parametrize("seed", range(20))

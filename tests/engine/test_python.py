@@ -25,6 +25,7 @@ from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.kernels.accelerate import COMPILED
 from stseg.tasks.forecast import Forecast
+from stseg.tasks.warnings import crowd_warnings
 
 RIG = rig_of(corner_cameras())
 
@@ -46,6 +47,22 @@ def test_a_run_without_an_output_goes_with_its_object(rig_path: Path) -> None:
     assert run.frames.tolist() == list(range(10))
     del run
     assert not path.parent.exists()
+
+
+@compiled_only
+def test_a_crowd_that_is_searched_in_part_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stseg.detection.search.frame_search.ENUMERATION_LIMIT", 0)
+    monkeypatch.setattr("stseg.detection.search.map_estimate.GAIN_LIMIT", 0)
+    tracker, results = stseg.Tracker(RIG, tracker="frames"), []
+    for frame_set in box_frame_sets(RIG, walkers(20), 0, 2):
+        results += tracker.add([view.pixel for view in frame_set.views if isinstance(view, Boxes)])
+    events = np.concatenate([result.events for result in [*results, *tracker.finish()]])
+    crowds = events[events["kind"] == b"crowd"]
+    assert crowds["frame"].tolist() == [0, 1]
+    number = int(crowds["reason"][0].split()[0])
+    assert number > 0
+    assert f"in 2 frames, first in frame 0: {number} candidates" in crowd_warnings(events)[0]
+    assert crowd_warnings(events[:0]) == []
 
 
 @pytest.mark.parametrize(

@@ -64,6 +64,8 @@ class SetState(NamedTuple):
     """int64 (candidate,): number of moves after which no replacement of a member helped, -1 if none was tried."""
     moves: Ints
     """int64 (1,): number of moves so far; one that is taken back counts."""
+    remaining: Ints
+    """int64 (1,): gains that may still be computed in a search."""
     total: Floats
     """float64 (1,): sum of the gains of all moves, nats."""
     gains: Floats
@@ -74,7 +76,7 @@ class SetState(NamedTuple):
     is_known: Flags
     """bool (part * candidate,): whether that is the gain in the set as it is."""
     kept: Kept
-    """The arrays of all fields from `members` on but the number of moves."""
+    """The arrays of all fields from `members` on but the two numbers of moves and remaining gains."""
 
 
 @kernel
@@ -90,8 +92,8 @@ def set_state(problem: DetectionProblem) -> SetState:
     return SetState(
         problem, _neighbours(problem), _overlapping(problem.pixels), boxes, tracks, numbers[: candidates + 1],
         numbers[candidates + 1 : candidates + 2], numbers[candidates + 2 : 2 * candidates + 2],
-        numbers[2 * candidates + 2 :], np.zeros(1, np.int64), kept.values[:1], kept.values[1:],
-        kept.flags[:candidates], kept.flags[candidates:], kept,
+        numbers[2 * candidates + 2 :], np.zeros(1, np.int64), np.zeros(1, np.int64), kept.values[:1],
+        kept.values[1:], kept.flags[:candidates], kept.flags[candidates:], kept,
     )  # fmt: skip
 
 
@@ -212,6 +214,7 @@ def gain(i: int, absent: int, state: SetState) -> float:
     whole = (boxes.views + views) * candidates + i
     if absent < 0 and state.is_known[whole]:
         return float(state.gains[whole])
+    state.remaining[0] -= 1
     total = problem.parameters.prior_log_odds + problem.size_prior[i] - problem.birth_cost[i]
     for k in range(state.neighbours.start[i], state.neighbours.start[i + 1]):
         total -= state.neighbours.value[k] if state.inside[state.neighbours.item[k]] else 0.0

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints
-from stseg.detection.problem import BoxEvidence, DetectionProblem, RaggedArray
+from stseg.arrays import Flags, Ints
+from stseg.detection.problem import RaggedArray
 from stseg.detection.score.set_state import SetState
 from stseg.kernels.accelerate import kernel, part
 
@@ -61,39 +61,3 @@ def mark_interacting(i: int, state: SetState, linked: Flags) -> None:
 def _mark_row(row: int, rows: RaggedArray, linked: Flags) -> None:
     for k in range(rows.start[row], rows.start[row + 1]):
         linked[rows.item[k]] = True
-
-
-@kernel
-def restricted(problem: DetectionProblem, group: Ints) -> DetectionProblem:
-    """A problem with the boxes and tracks alone that a group (n,) may take; candidates keep their numbers."""
-    boxes, parameters = problem.boxes, problem.parameters
-    number = np.zeros(len(boxes.boxes), np.int64)
-    match = np.empty(boxes.match.shape)  # filled, and read, for the group's boxes alone
-    for view in range(len(number)):
-        for b in range(boxes.boxes[view]):
-            matches = boxes.match[view, :, b][group]
-            if (parameters.box_log_ratio + matches > np.log(parameters.box_miss_rate)).any():
-                for i in group:
-                    match[view, i, number[view]] = boxes.match[view, i, b]
-                number[view] += 1
-    return DetectionProblem(
-        BoxEvidence(match, number, boxes.hiders, boxes.inside, boxes.visible_past), problem.pixels, problem.size_prior,
-        problem.birth_cost, _tracks_of(problem, group), problem.ground, problem.breadth, parameters,
-        problem.assignment, problem.track_member, problem.owner, problem.view_evidence,
-    )  # fmt: skip
-
-
-@kernel
-def _tracks_of(problem: DetectionProblem, group: Ints) -> Floats:
-    """Gains of the tracks that a group may continue, float64 (candidate, k)."""
-    chosen = np.zeros(problem.track_gain.shape[1], np.int64)
-    count = 0
-    for k in range(len(chosen)):
-        if ((problem.birth_cost + problem.track_gain[:, k])[group] > 0).any():
-            chosen[count] = k
-            count += 1
-    gains = np.zeros((len(problem.track_gain), count))
-    for i in group:
-        for k in range(count):
-            gains[i, k] = problem.track_gain[i, chosen[k]]
-    return gains

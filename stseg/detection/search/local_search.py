@@ -37,8 +37,11 @@ _INSERTION_GAIN = -12.0
 
 @kernel
 def local_search(group: Ints, in_group: Flags, state: SetState) -> None:
-    """Simple moves among the candidates of a group, int64 (n,) and bool (candidate,), until none helps."""
-    for _ in range(_SWEEP_LIMIT):
+    """Simple moves among the candidates of a group, int64 (n,) and bool (candidate,), until none helps.
+
+    All searches end when no gains remain that may be computed.
+    """
+    for _ in range(_SWEEP_LIMIT if state.remaining[0] > 0 else 0):
         before = state.moves[0]
         _add_best(group, state)
         _remove_worthless(-1, state.inside, state)
@@ -56,7 +59,7 @@ def swap_moves(group: Ints, sweeps: int, state: SetState) -> None:
     for _ in range(sweeps):
         is_changed = False
         for i in group:
-            if tried[i] >= 0 and not _is_changed(read[i], tried[i], state):
+            if state.remaining[0] <= 0 or (tried[i] >= 0 and not _is_changed(read[i], tried[i], state)):
                 continue
             mark_interacting(i, state, interacts)
             before, score, first = copy_of(state), state.total[0], state.moves[0]
@@ -128,7 +131,7 @@ def _distance(i: int, j: int, problem: DetectionProblem) -> float:
 def _add_best(group: Ints, state: SetState) -> None:
     """Add the best candidate while one helps; gains seldom rise, so candidates far below the best are tried once."""
     gains = np.full(len(group), np.inf)
-    while True:
+    while state.remaining[0] > 0:
         best, best_gain = -1, SCORE_TOLERANCE
         for k in range(len(group)):
             if state.inside[group[k]] or gains[k] < best_gain - _RETRY_MARGIN:
@@ -145,7 +148,7 @@ def _add_best(group: Ints, state: SetState) -> None:
 def _remove_worthless(fixed: int, removable: Flags, state: SetState) -> None:
     """Remove each member that lowers the score, of those that are removable (candidate,), but not `fixed`."""
     a = 0
-    while a < state.size[0]:
+    while a < state.size[0] and state.remaining[0] > 0:
         i = state.members[a]
         if removable[i] and i != fixed and gain(i, -1, state) < -SCORE_TOLERANCE:
             remove(a, state)
@@ -160,7 +163,7 @@ def _replace(in_group: Flags, state: SetState) -> None:
     Where no gain of them has changed since none did, that is not tried again.
     """
     neighbours = state.neighbours
-    for a in range(state.size[0]):
+    for a in range(state.size[0] if state.remaining[0] > 0 else 0):
         member, is_open = state.members[a], False
         for k in range(neighbours.start[member], neighbours.start[member + 1]):
             i = neighbours.item[k]

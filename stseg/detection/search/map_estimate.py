@@ -6,7 +6,7 @@ member, and the assignment of boxes and pixels. A further round makes a further 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,7 @@ from stseg.detection.frame_evidence import FrameEvidence
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.scoring import fill_box_assignment, fill_set_score
 from stseg.detection.score.set_state import fill_gains
-from stseg.detection.search.best_set import find_best_set
+from stseg.detection.search.best_set import GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
 
@@ -62,6 +62,8 @@ class MapEstimate:
     """The same as arrays, for the kernels."""
     members: Ints
     """int64 (n,): the chosen candidates."""
+    unfinished: int = 0
+    """Candidates of the largest group that was not searched to the end, 0 for none."""
 
     @classmethod
     def of_search(
@@ -79,18 +81,18 @@ class MapEstimate:
         """The best set among the same candidates, from the members on."""
         members, count = np.zeros(len(self.pool) + 1, np.int64), len(self.members)
         members[:count] = self.members
-        count = find_best_set(members, count, self.problem, enumeration_limit, swap_sweeps)
-        return self.with_members(members[:count].copy())
+        count, unfinished = find_best_set(members, count, self.problem, enumeration_limit, swap_sweeps, GAIN_LIMIT)
+        return replace(self.with_members(members[:count].copy()), unfinished=unfinished)
 
     def with_members(self, members: Ints) -> MapEstimate:
         """The same candidates with other members, int64 (n,)."""
-        return MapEstimate(self.evidence, self.pool, self.bodies, self.problem, members)
+        return replace(self, members=members)
 
     def with_more(self, more: Candidates) -> MapEstimate:
         """The same members among more candidates, which come after those of this estimate."""
         evidence, pool = self.evidence, self.pool.joined_with(more)
         bodies = self.bodies.joined_with(ProjectedBodies.of(evidence.views, more))
-        return MapEstimate(evidence, pool, bodies, evidence.problem(pool, bodies, self.problem), self.members)
+        return replace(self, pool=pool, bodies=bodies, problem=evidence.problem(pool, bodies, self.problem))
 
     def searched_with(self, more: Candidates, start: Ints) -> MapEstimate:
         """Search the best set among more candidates, from the candidates `start` int64 (n,) on."""
