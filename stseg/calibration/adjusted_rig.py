@@ -35,7 +35,7 @@ class ViewReport:
     focal_spread: float
     """Focal length and its standard deviation, pixels."""
     centre_spread: float
-    """Standard deviation of the camera centre, metres."""
+    """Standard deviation of the camera centre from the middle of the ground, that of the scale included, metres."""
     clock: float
     clock_spread: float
     """Residual delay beyond whole frames, and its standard deviation, seconds."""
@@ -54,6 +54,7 @@ def scaled(solution: SolvedViews, factor: float) -> SolvedViews:
         replace(parameters, views=views, toe_offset=factor * parameters.toe_offset, points=factor * parameters.points),
         scale[:, None] * solution.adjustment.covariance * scale,
         replace(matched, ground=factor * matched.ground, velocity=factor * matched.velocity),
+        factor * solution.problem.height,
     )
 
 
@@ -68,21 +69,17 @@ def centred(solution: SolvedViews) -> SolvedViews:
     points = np.column_stack([(parameters.points[:, :2] - middle) @ about.T, parameters.points[:, 2]])
     turned = replace(matched, ground=(matched.ground - middle) @ about.T, velocity=matched.velocity @ about.T)
     covariance = solution.adjustment.covariance
-    return _replaced(solution, replace(parameters, views=views, points=points), covariance, turned)
+    return _replaced(
+        solution, replace(parameters, views=views, points=points), covariance, turned, solution.problem.height
+    )
 
 
 def _replaced(
-    solution: SolvedViews, parameters: BundleParameters, covariance: Floats, matched: Correspondences
+    solution: SolvedViews, parameters: BundleParameters, covariance: Floats, matched: Correspondences, height: Floats
 ) -> SolvedViews:
     adjustment = replace(solution.adjustment, parameters=parameters, covariance=covariance)
-    return replace(solution, adjustment=adjustment, problem=replace(solution.problem, correspondences=matched))
-
-
-def distance_factor(solution: SolvedViews, view: int, pixels: Floats, metres: float) -> float:
-    """Scale factor that puts two ground pixels (2, 2) of a view `metres` apart; nan above the horizon."""
-    camera = solution.adjustment.parameters.views[view]
-    ground = on_plane(camera, _size(solution, view), pixels, 0.0)
-    return metres / float(np.linalg.norm(ground[1] - ground[0]))
+    problem = replace(solution.problem, correspondences=matched, height=height)
+    return replace(solution, adjustment=adjustment, problem=problem)
 
 
 def cameras_of(solution: SolvedViews, names: Sequence[str]) -> tuple[Camera, ...]:
@@ -107,12 +104,12 @@ def grid_of(solution: SolvedViews, cell: float) -> Grid:
     return Grid((x[0], x[1]), (y[0], y[1]), cell)
 
 
-def reports_of(solution: SolvedViews) -> list[ViewReport]:
-    """A report of each view."""
-    return [_report(solution, view) for view in range(len(solution.delay))]
+def reports_of(solution: SolvedViews, scale_spread: float) -> list[ViewReport]:
+    """A report of each view; `scale_spread` is the relative standard deviation of all lengths."""
+    return [_report(solution, view, scale_spread) for view in range(len(solution.delay))]
 
 
-def _report(solution: SolvedViews, view: int) -> ViewReport:
+def _report(solution: SolvedViews, view: int, scale_spread: float) -> ViewReport:
     adjustment, correspondences = solution.adjustment, solution.problem.correspondences
     parameters, size = adjustment.parameters, _size(solution, view)
     rows = np.flatnonzero(correspondences.view == view)
@@ -134,7 +131,7 @@ def _report(solution: SolvedViews, view: int) -> ViewReport:
         head_metres=float(np.nanmedian(np.abs(heights - points[:, 2]))),
         focal=focal,
         focal_spread=focal * float(spread[FOCAL]),
-        centre_spread=float(np.linalg.norm(spread[CENTRE])),
+        centre_spread=float(np.hypot(np.linalg.norm(spread[CENTRE]), scale_spread * np.linalg.norm(camera[CENTRE]))),
         clock=float(camera[CLOCK]),
         clock_spread=float(spread[CLOCK]),
     )

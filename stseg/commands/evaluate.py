@@ -15,6 +15,7 @@ from stseg.arrays import Ints, Rows
 from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
+from stseg.evaluation.alignment import Alignment
 from stseg.evaluation.sequence import Area
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
@@ -30,6 +31,7 @@ def evaluate(
     frames: str | None = None,
     area: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     ignore_flagged: Annotated[bool, Parameter(negative="")] = False,
+    align: Alignment = "none",
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> None:
     """Score tracks on the ground against the truth.
@@ -55,12 +57,15 @@ def evaluate(
         x0,y0,x1,y1 in metres: people outside, and tracks matched to them, are ignored.
     ignore_flagged
         Ignore rows of the truth whose flag is not 0, and tracks matched to them.
+    align
+        Turn and shift the tracks onto the truth first (rigid), and scale them too (similarity): for a rig on a ground
+        of its own, such as that of `stseg calibrate auto`.
     as_json
         Print one JSON object.
     """
     asked_frames = None if frames is None else _frames(frames)
     asked_area = None if area is None else _area(area)
-    scores = score(read_tracks_csv(truth), _read(tracks), gate, asked_area, asked_frames, ignore_flagged)
+    scores = score(read_tracks_csv(truth), _read(tracks), gate, asked_area, asked_frames, ignore_flagged, align)
     if as_json:
         print(json.dumps(scores.as_dict(), indent=1))
     else:
@@ -106,7 +111,8 @@ def _table(scores: Scores) -> Table:
     if scores.area is not None:
         x0, y0, x1, y1 = scores.area
         place = f"x {x0:g} .. {x1:g}, y {y0:g} .. {y1:g} m"
-    title = f"{scores.frames} frames, gate {scores.gate:g} m, {place}"
+    scale = "" if scores.scale == 1 else f", tracks scaled by {scores.scale:.3f}"
+    title = f"{scores.frames} frames, gate {scores.gate:g} m, {place}{scale}"
     table = Table(title=title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
     found = {"MODA": scores.moda, "precision": scores.precision, "recall": scores.recall, "MODP": scores.modp}
     followed = {"MOTA": scores.mota, "IDF1": scores.idf1, "HOTA": scores.hota, "2 gates": scores.hota_2gate}

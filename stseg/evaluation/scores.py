@@ -9,6 +9,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.errors import ConfigError
+from stseg.evaluation.alignment import Alignment, best_placing
 from stseg.evaluation.clear import (
     Matches,
     false_tracks,
@@ -31,6 +32,8 @@ class Scores:
     ----------
     gate, area, frames
         Settings of the evaluation: gate in metres, ground rectangle in metres, number of frames.
+    scale
+        Factor of the tracks' lengths by the alignment; 1 without one.
     truths, detections
         Number of evaluated rows of the truth and of the tracks.
     people, tracks
@@ -58,6 +61,7 @@ class Scores:
     gate: float
     area: Area | None
     frames: int
+    scale: float
     truths: int
     detections: int
     people: int
@@ -113,7 +117,7 @@ class Scores:
             "gate_m": self.gate,
             "area": None if self.area is None else list(self.area),
             "HOTA_similarity": "1 - d/gate",
-        }
+        } | ({} if self.scale == 1 else {"scale": round(self.scale, 4)})
 
 
 def evaluate(
@@ -123,6 +127,7 @@ def evaluate(
     area: Area | None = None,
     frames: Ints | None = None,
     ignore_flagged: bool = False,
+    align: Alignment = "none",
 ) -> Scores:
     """Score ground tracks against the truth.
 
@@ -140,6 +145,9 @@ def evaluate(
         The frames to evaluate; by default those of the truth. A frame without detections counts.
     ignore_flagged
         Treat rows of the truth with a flag other than 0 as people outside the area.
+    align
+        Turn and shift the tracks onto the truth first ("rigid"), and scale them too ("similarity"): for rigs whose
+        ground is not that of the truth.
 
     Raises
     ------
@@ -152,17 +160,22 @@ def evaluate(
         raise ConfigError("evaluation", "gate", gate, "metres, above 0")
     if area is not None and not (area[0] < area[2] and area[1] < area[3]):
         raise ConfigError("evaluation", "area", area, "x0, y0, x1, y1 in metres with x0 below x1 and y0 below y1")
-    sequence = align_frames(truth, trajectory, gate, area, frames, ignore_flagged)
-    return _score(sequence, match_per_frame(sequence, gate), match_with_continuity(sequence, gate), gate, area)
+    placing = best_placing(truth, trajectory, gate, align)
+    sequence = align_frames(truth, placing.of(trajectory), gate, area, frames, ignore_flagged)
+    matches = match_per_frame(sequence, gate), match_with_continuity(sequence, gate)
+    return _score(sequence, *matches, gate, area, abs(placing.factor))
 
 
-def _score(sequence: Sequence, per_frame: Matches, kept: Matches, gate: float, area: Area | None) -> Scores:
+def _score(
+    sequence: Sequence, per_frame: Matches, kept: Matches, gate: float, area: Area | None, scale: float
+) -> Scores:
     truths, detections, hits, swaps = sequence.truths, sequence.detections, len(per_frame), switches(kept)
     share, false = matched_share(kept, sequence), false_tracks(kept, sequence)
     return Scores(
         gate=gate,
         area=area,
         frames=len(sequence.frames),
+        scale=scale,
         truths=truths,
         detections=detections,
         people=sequence.people,

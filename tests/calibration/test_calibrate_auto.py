@@ -14,7 +14,7 @@ from refusals import refused
 from simulated_people import Walking, changed, delayed, walking
 
 from stseg.arrays import Floats, Singles
-from stseg.calibration.adjusted_rig import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled
+from stseg.calibration.adjusted_rig import cameras_of, centred, grid_of, offsets_of, reports_of, scaled
 from stseg.calibration.automatic.auto import (
     align_all,
     calibrate_from_people,
@@ -24,6 +24,7 @@ from stseg.calibration.automatic.auto import (
 )
 from stseg.calibration.automatic.correspondence import match_endpoints
 from stseg.calibration.automatic.endpoints import Endpoints, path_of, upright_endpoints
+from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measured, scale_spread
 from stseg.calibration.automatic.single_view import view_of_upright
 from stseg.calibration.automatic.solution import SolvedViews, refine_cameras
 from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored_paths
@@ -98,7 +99,7 @@ def test_ends_of_one_who_stands_free() -> None:
     [
         [],
         [(100, 179, 100, 120)],  # cut by the border
-        [(100, 150, 100, 80), (121, 150, 121, 80)],  # too near to each other
+        [(100, 150, 100, 80), (118, 150, 118, 80)],  # too near to each other
         [(60, 100, 130, 100)],  # lies
         [(100, 105, 100, 95)],  # no body
     ],
@@ -195,7 +196,7 @@ def test_the_whole_way_finds_cameras_clocks_and_scale(scene: Walking, solution: 
 
 
 def test_focal_lengths_are_as_near_as_they_say(scene: Walking, solution: SolvedViews) -> None:
-    for camera, report in zip(scene.rig.cameras, reports_of(solution), strict=True):
+    for camera, report in zip(scene.rig.cameras, reports_of(solution, 0.0), strict=True):
         assert camera.lens is not None
         assert abs(report.focal - camera.lens.matrix[0, 0]) < 4 * report.focal_spread + 1
         assert 0 < report.centre_spread < 0.5 and report.foot_pixels < 4 and report.observations > 100
@@ -229,11 +230,26 @@ def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: Solve
 
 def test_a_known_distance_fixes_the_scale(solution: SolvedViews) -> None:
     pixel = np.array([[150.0, 250.0], [300.0, 260.0]])
-    larger = scaled(solution, distance_factor(solution, 1, pixel, 3.0))
-    assert distance_factor(larger, 1, pixel, 3.0) == pytest.approx(1.0)
-    factor = larger.adjustment.parameters.points[0, 2] / solution.adjustment.parameters.points[0, 2]
-    spread = [reports_of(one)[0].centre_spread for one in (solution, larger)]
-    assert spread[1] == pytest.approx(factor * spread[0])
+    known = [KnownDistance(1, pixel, 3.0)]
+    larger = adjusted_to(solution, known)
+    assert measured(larger, known) == pytest.approx(3.0)
+    assert scale_spread(larger, known) < 0.03 < scale_spread(solution, []) < 0.1
+
+
+def test_uncertainties_of_lengths_contain_that_of_the_scale(solution: SolvedViews) -> None:
+    spread = [reports_of(one, 0.1)[0].centre_spread for one in (solution, scaled(solution, 2.0))]
+    away = np.linalg.norm(solution.adjustment.parameters.views[0, 8:11])
+    assert spread[0] > 0.1 * away and spread[1] == pytest.approx(2 * spread[0])
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_known_distances_make_the_plan_right(scene: Walking, solution: SolvedViews, count: int) -> None:
+    ground = np.array([[[-1.0, 0.0], [1.5, 0.0]], [[0.0, -1.0], [0.0, 1.5]], [[-1.0, -1.0], [1.0, 1.0]]])[:count]
+    pixels = [scene.rig.cameras[k].project(pair, np.zeros(2))[0] for k, pair in enumerate(ground)]
+    metres = np.linalg.norm(ground[:, 1] - ground[:, 0], axis=1)
+    known = [KnownDistance(k, pair, float(metres[k])) for k, pair in enumerate(pixels)]
+    _, scale = ground_errors(scene, adjusted_to(solution, known))
+    assert scale == pytest.approx(1.0, abs=0.015 if count == 1 else 0.01)
 
 
 def true_walks(scene: Walking) -> list[ViewPaths]:
@@ -297,25 +313,27 @@ def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.Captur
     for video, endpoints in zip(videos, scene.views.endpoints, strict=True):
         film(video, endpoints, 200)
     output = tmp_path / "rig.toml"
-    distance = "a,150,250,300,260,3"
+    distance = ("a,150,250,300,260,3",)
     calibrate_auto(*videos, output=output, frame_rate=5.0, source_kind="masks", most_delay=0.0, distance=distance)
     recording = read_recording(output)
     assert [camera.name for camera in recording.rig.cameras] == ["a", "b"]
     ground = recording.rig.cameras[0].back_project(np.array([[150.0, 250.0], [300.0, 260.0]]))
     assert np.linalg.norm(ground[1] - ground[0]) == pytest.approx(3.0, abs=0.01)
-    assert "scale: by the distance given" in capsys.readouterr().out
+    assert "distance in a: 3.000 m instead of 3 (+0.0 %)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"distance": "z,1,2,3,4,5"}, "camera,u,v,u,v,metres with a camera of a, b"),
-        ({"distance": "a,1,2,1,2,5"}, "two different pixels"),
+        ({"distance": ("z,1,2,3,4,5",)}, "camera,u,v,u,v,metres with a camera of a, b"),
+        ({"distance": ("a,1,2,1,2,5",)}, "two different pixels"),
         ({"frame_rate": 0.0}, "--frame-rate"),
         ({"frames": "9:3"}, "--frames"),
     ],
 )
-def test_wrong_options_are_named(tmp_path: Path, options: dict[str, str | float], message: str) -> None:
+def test_wrong_options_are_named(
+    tmp_path: Path, options: dict[str, tuple[str, ...] | str | float], message: str
+) -> None:
     for name in ("a", "b"):
         film(tmp_path / f"{name}.avi", walking(1, 1, 2.0).views.endpoints[0], 3)
     given = {"frame_rate": 5.0, "source_kind": "masks", **options}

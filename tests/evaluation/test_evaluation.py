@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -362,3 +362,26 @@ def test_a_run_file_is_read_as_a_run(
     monkeypatch.setitem(sys.modules, "stseg.io.runfile.runs", runs)
     command(Path("night.h5"), files[1], as_json=True)
     assert json.loads(capsys.readouterr().out)["MODA"] == 100
+
+
+@pytest.mark.parametrize(
+    ("align", "scale", "mean"), [("rigid", 1.0, 0.0), ("similarity", 1.2, 0.0), ("rigid", 1.2, 0.05)]
+)
+def test_tracks_of_another_ground_are_laid_on_the_truth(
+    align: Literal["rigid", "similarity"], scale: float, mean: float
+) -> None:
+    """Turned, shifted and scaled tracks score as they did; a scale is mended by a similarity alone."""
+    angle = np.linspace(0, 5, 60)
+    truth = table(
+        [(k, 1, float(np.cos(a)), float(np.sin(2 * a))) for k, a in enumerate(angle)]
+        + [(k, 2, float(np.sin(3 * a)), 2 - 0.02 * k) for k, a in enumerate(angle)]
+    )
+    place = (truth["x"] + 1j * truth["y"]) * np.exp(2j) / scale + 3 - 1j
+    tracks = truth.copy()
+    tracks["x"], tracks["y"] = place.real, place.imag
+    aligned = evaluate(truth, tracks, align=align)
+    assert evaluate(truth, tracks).moda == -100 and aligned.moda == 100 and aligned.switches == 0
+    assert aligned.location_mean is not None and (
+        aligned.location_mean > mean or mean == 0 > aligned.location_mean - 1e-6
+    )
+    assert aligned.scale == pytest.approx(scale if align == "similarity" else 1)

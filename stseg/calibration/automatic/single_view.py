@@ -19,7 +19,7 @@ from stseg.calibration.pinhole import CENTRE, FOCAL, RADIAL, SIZE, TURN, looking
 
 _SPREAD = 0.05
 """Standard deviation of endpoints around the model of equal upright people, in body lengths."""
-FORWARD = 0.15
+FORWARD = 0.25
 """Distance from a body's axis to its lowest visible point, towards the camera (a toe, half a step), metres."""
 _STARTS = tuple(product((0.6, 0.9, 1.4), (0.2, 0.5), (0.0, -0.3)))
 """Starts of the search: focal length in image widths, pitch in radians, k1."""

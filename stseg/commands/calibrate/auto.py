@@ -22,7 +22,7 @@ def calibrate_auto(
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
     frame_rate: float,
     person_height: float = 1.7,
-    distance: Annotated[str | None, Parameter(metavar="CAMERA,U,V,U,V,METRES")] = None,
+    distance: Annotated[tuple[str, ...], Parameter(metavar="CAMERA,U,V,U,V,METRES", negative="")] = (),
     most_delay: float = 2.0,
     frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
     background: Annotated[str | None, Parameter(metavar="PATTERN")] = None,
@@ -51,7 +51,7 @@ def calibrate_auto(
     person_height
         Mean body height, metres. It sets the scale where no distance is given.
     distance
-        Two ground pixels of one camera and their distance in metres; it sets the scale.
+        Two ground pixels of one camera and their distance in metres; it sets the scale. May be repeated.
     most_delay
         Greatest delay of one video against another, seconds; 0 where all are synchronous.
     frames
@@ -65,12 +65,13 @@ def calibrate_auto(
     overwrite
         Replace the rig file if it exists.
     """
+    distances = [_distance(text, camera_names(videos)) for text in distance]
     found = automatic.calibrate_auto(
         videos,
         output,
         frame_rate=frame_rate,
         person_height=person_height,
-        distance=None if distance is None else _distance(distance, camera_names(videos)),
+        distances=distances,
         most_delay=most_delay,
         frames=FrameRange.parsed(frames),
         background=background,
@@ -79,7 +80,7 @@ def calibrate_auto(
         overwrite=overwrite,
         progress=TerminalReporter(),
     )
-    _print(found, person_height if distance is None else None)
+    _print(found, person_height, distances)
     print(
         f"{output}: {len(found.reports)} cameras, from {found.people} people and frames"
         + (f" and {found.floor_marks} marks on the floor" if found.floor_marks else _NO_MARKS)
@@ -89,7 +90,7 @@ def calibrate_auto(
 _NO_MARKS = ", the floor shows no marks that views share"
 
 
-def _print(found: AutomaticCalibration, person_height: float | None) -> None:
+def _print(found: AutomaticCalibration, person_height: float, distances: Sequence[Distance]) -> None:
     cameras = zip(found.recording.rig.cameras, found.recording.sources, found.reports, strict=True)
     for camera, source, report in cameras:
         x, y, z = camera.centre
@@ -100,10 +101,15 @@ def _print(found: AutomaticCalibration, person_height: float | None) -> None:
             f"{report.observations} sightings: feet {report.foot_pixels:.1f} px ({100 * report.ground_metres:.0f} cm), "
             f"heads {report.head_pixels:.1f} px ({100 * report.head_metres:.0f} cm) off"
         )
-    if person_height is None:
-        print(f"scale: by the distance given; people are {found.height:.2f} m tall on the average")
+    spread = f"all lengths are uncertain by {100 * found.scale_spread:.1f} % (one standard deviation)"
+    for (camera, *_, metres), length in zip(distances, found.distances, strict=True):
+        off = round(100 * (length / metres - 1), 1) + 0.0  # no -0.0
+        print(f"distance in {camera}: {length:.3f} m instead of {metres:g} ({off:+.1f} %)")
+    if distances:
+        print(f"scale: by what is given; people are {found.height:.2f} m tall on the average; {spread}")
     else:
-        print(f"scale: people are taken to be {person_height:g} m tall on the average (--person-height, --distance)")
+        print(f"scale: people are taken to be {person_height:g} m tall on the average (--person-height); {spread}")
+        print("scale: one or more distances on the floor make it certain (--distance)")
 
 
 def _distance(text: str, names: Sequence[str]) -> Distance:

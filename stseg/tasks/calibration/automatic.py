@@ -13,14 +13,13 @@ from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import (
     ViewReport,
     cameras_of,
-    distance_factor,
     grid_of,
     offsets_of,
     reports_of,
-    scaled,
 )
 from stseg.calibration.automatic.auto import calibrate_from_people, sharpen_by_floor, steps_of
 from stseg.calibration.automatic.endpoints import Endpoints, concatenate_endpoints, upright_endpoints
+from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measured, scale_spread, scaled_to
 from stseg.calibration.automatic.solution import CalibrationInput, SolvedViews
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
@@ -60,6 +59,10 @@ class AutomaticCalibration:
         Mean height of these people, metres.
     floor_marks
         Number of marks on the floor that several views share.
+    scale_spread
+        Relative standard deviation of all lengths; the reports' uncertainties contain it.
+    distances
+        Metres that the rig gives for each known distance.
     """
 
     recording: Recording
@@ -67,6 +70,8 @@ class AutomaticCalibration:
     people: int
     height: float
     floor_marks: int
+    scale_spread: float
+    distances: tuple[float, ...]
 
 
 def calibrate_auto(
@@ -75,7 +80,7 @@ def calibrate_auto(
     *,
     frame_rate: float,
     person_height: float = 1.7,
-    distance: Distance | None = None,
+    distances: Sequence[Distance] = (),
     most_delay: float = 2.0,
     frames: tuple[int | None, int | None] | None = None,
     background: str | None = None,
@@ -96,8 +101,8 @@ def calibrate_auto(
         Frames per second of all videos.
     person_height
         Mean body height, metres. It sets the scale where no distance is given.
-    distance
-        (camera, u, v, u, v, metres): two ground pixels of one camera and their distance.
+    distances
+        Each (camera, u, v, u, v, metres): two ground pixels of one camera and their distance.
     most_delay
         Greatest delay of one video against another, seconds; 0 where all are synchronous.
     frames
@@ -123,7 +128,7 @@ def calibrate_auto(
     streams = _streams(paths, output, frame_rate, background, source_kind)
     require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
-    stated_distance = None if distance is None else _known_distance(distance, names)
+    known = [_known_distance(distance, names) for distance in distances]
     counted = index_streams(streams)
     for note in counted.notes:
         reporter.note(note)
@@ -138,19 +143,27 @@ def calibrate_auto(
     )
     with reporter.progress("calibrating", steps_of(len(names))) as advance:
         solution = calibrate_from_people([str(path) for path in paths], views, lambda: advance(1))
+    _require_ground(solution, known)
+    if known:
+        solution = adjusted_to(solution, known)
+        views = replace(views, person_height=float(np.median(solution.adjustment.parameters.points[:, 2])))
     floor_marks, backgrounds = 0, _background_images(foregrounds)
     if backgrounds:
         solution, floor_marks = sharpen_by_floor(views, solution, backgrounds)
-    if stated_distance is not None:
-        factor = distance_factor(solution, *stated_distance)
-        if not np.isfinite(factor):
-            raise ConfigError("--distance", "", "a pixel above the horizon", "pixels that show the ground")
-        solution = scaled(solution, factor)
+    if known:
+        solution = scaled_to(solution, known)
     recording = _recording(output, streams, solution, cell)
     write_rig(output, recording, overwrite)
     points = solution.adjustment.parameters.points
+    spread = scale_spread(solution, known)
     return AutomaticCalibration(
-        recording, tuple(reports_of(solution)), len(points), float(np.median(points[:, 2])), floor_marks
+        recording,
+        tuple(reports_of(solution, spread)),
+        len(points),
+        float(np.median(points[:, 2])),
+        floor_marks,
+        spread,
+        tuple(measured(solution, known).tolist()),
     )
 
 
@@ -186,15 +199,21 @@ def _streams(
     return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
 
 
-def _known_distance(distance: Distance, names: Sequence[str]) -> tuple[int, Floats, float]:
-    """View, pixels (2, 2) and metres of a distance."""
+def _known_distance(distance: Distance, names: Sequence[str]) -> KnownDistance:
     camera, *pixels, metres = distance
     found = repr(",".join([camera, *(f"{number:g}" for number in (*pixels, metres))]))
     if camera not in names:
         raise ConfigError("--distance", "", found, f"camera,u,v,u,v,metres with a camera of {', '.join(names)}")
     if not metres > 0 or pixels[:2] == pixels[2:]:
         raise ConfigError("--distance", "", found, "two different pixels, and metres above 0")
-    return list(names).index(camera), np.array(pixels, float).reshape(2, 2), metres
+    return KnownDistance(list(names).index(camera), np.array(pixels, float).reshape(2, 2), metres)
+
+
+def _require_ground(solution: SolvedViews, known: Sequence[KnownDistance]) -> None:
+    """Raise ConfigError for a distance whose pixels do not show the ground."""
+    for number, metres in enumerate(measured(solution, known), start=1):
+        if not np.isfinite(metres):
+            raise ConfigError("--distance", str(number), "a pixel above the horizon", "pixels that show the ground")
 
 
 def _frame_range(frames: tuple[int | None, int | None] | None, length: int) -> tuple[int, int]:
