@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from stseg.io.recording.rigs import read_recording, write_rig
     from stseg.io.runfile.runs import Run, read_run
     from stseg.io.track_csv import read_tracks_csv
+    from stseg.tasks.calibration.alignment import align_rig
     from stseg.tasks.calibration.automatic import calibrate_auto
     from stseg.tasks.calibration.check import check_rig
     from stseg.tasks.calibration.points import calibrate_points
@@ -64,6 +65,7 @@ __all__ = [
     "Source",
     "StsegError",
     "Tracker",
+    "align_rig",
     "calibrate_auto",
     "calibrate_points",
     "check_rig",
@@ -97,6 +99,7 @@ _HOMES = {
     "stseg.io.recording.rigs": ("read_recording", "write_rig"),
     "stseg.io.runfile.runs": ("Run", "read_run"),
     "stseg.io.track_csv": ("read_tracks_csv",),
+    "stseg.tasks.calibration.alignment": ("align_rig",),
     "stseg.tasks.calibration.automatic": ("calibrate_auto",),
     "stseg.tasks.calibration.check": ("check_rig",),
     "stseg.tasks.calibration.points": ("calibrate_points",),

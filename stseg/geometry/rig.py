@@ -126,9 +126,13 @@ class Rig:
         ground = self.grid.ground[self.grid.inside()]
         for camera in self.cameras:
             if not any(np.any(_sees(camera, ground, height)) for height in self.grid.heights):
-                raise CalibrationError(
-                    f"camera {camera.name}", "ground", "a view that sees nothing of the area", "some cell in its image"
-                )
+                found, expected = "a view that sees nothing of the area", "some cell in its image"
+                if is_mirrored(camera, self.grid):
+                    found = "a mirrored ground (y counted downwards, as in a picture?)"
+                    expected = (
+                        "y counted upwards: change the sign of y, in the matrix its second column, and in the area"
+                    )
+                raise CalibrationError(f"camera {camera.name}", "ground", found, expected)
 
 
 def _sees(camera: Camera, ground: Floats, height: float) -> Floats:

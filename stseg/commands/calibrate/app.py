@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cyclopts import App
 
+from stseg.commands.calibrate.align import align
 from stseg.commands.calibrate.auto import calibrate_auto
 from stseg.commands.calibrate.check import check
 from stseg.commands.calibrate.importing import import_calibration
@@ -17,4 +18,5 @@ app.command(calibrate_page, name="page")
 app.command(calibrate_points, name="points")
 app.command(import_calibration, name="import")
 app.command(calibrate_auto, name="auto")
+app.command(align, name="align")
 app.command(check, name="check")

@@ -81,6 +81,9 @@ def calibrate_auto(
         progress=TerminalReporter(),
     )
     _print(found, person_height, distances)
+    offsets = {source.offset for source in found.recording.sources}
+    if most_delay and len(offsets) > 1 and max(offsets) - min(offsets) == 1:
+        print("offsets: all within one frame; if the cameras are synchronous, say so (--most-delay 0)")
     print(
         f"{output}: {len(found.reports)} cameras, from {found.people} people and frames"
         + (f" and {found.floor_marks} marks on the floor" if found.floor_marks else _NO_MARKS)
