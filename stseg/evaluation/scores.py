@@ -89,7 +89,7 @@ class Scores:
 
     def as_dict(self) -> dict[str, object]:
         """The figures under their names in the literature, percent to two decimals and metres to four."""
-        return {
+        figures: dict[str, object] = {
             "frames": self.frames,
             "n_truth": self.truths,
             "n_det": self.detections,
@@ -117,7 +117,10 @@ class Scores:
             "gate_m": self.gate,
             "area": None if self.area is None else list(self.area),
             "HOTA_similarity": "1 - d/gate",
-        } | ({} if self.scale == 1 else {"scale": round(self.scale, 4)})
+        }
+        if self.scale != 1:
+            figures["scale"] = round(self.scale, 4)
+        return figures
 
 
 def evaluate(

@@ -105,9 +105,9 @@ def _print(found: AutomaticCalibration, person_height: float, distances: Sequenc
             f"heads {report.head_pixels:.1f} px ({100 * report.head_metres:.0f} cm) off"
         )
     spread = f"all lengths are uncertain by {100 * found.scale_spread:.1f} % (one standard deviation)"
-    for (camera, *_, metres), length in zip(distances, found.distances, strict=True):
+    for (view, *_, metres), length in zip(distances, found.distances, strict=True):
         off = round(100 * (length / metres - 1), 1) + 0.0  # no -0.0
-        print(f"distance in {camera}: {length:.3f} m instead of {metres:g} ({off:+.1f} %)")
+        print(f"distance in {view}: {length:.3f} m instead of {metres:g} ({off:+.1f} %)")
     if distances:
         print(f"scale: by what is given; people are {found.height:.2f} m tall on the average; {spread}")
     else:
