@@ -99,7 +99,7 @@ def test_ends_of_one_who_stands_free() -> None:
     [
         [],
         [(100, 179, 100, 120)],  # cut by the border
-        [(100, 150, 100, 80), (118, 150, 118, 80)],  # too near to each other
+        [(100, 150, 100, 80), (121, 150, 121, 80)],  # too near to each other
         [(60, 100, 130, 100)],  # lies
         [(100, 105, 100, 95)],  # no body
     ],

@@ -24,8 +24,8 @@ _HEAD_SHARE, _FEET_SHARE = 0.06, 0.12
 _EROSION = 1.0
 """Distance from the centre of a silhouette's last pixel to the end of the body, pixels: half a pixel, and as much again
 lost to pooling over neighbours and to the high likelihood threshold."""
-_CLEARANCE = 0.03
-"""Free space around an isolated silhouette, share of its length."""
+_CLEARANCE, _MIN_CLEARANCE = 0.03, 5
+"""Free space around an isolated silhouette, share of its length, and at least so many pixels."""
 _NOISE_AREA = 0.03
 """Greatest area of a component that counts as noise rather than a fragment, share of the silhouette's area."""
 
@@ -92,7 +92,7 @@ def _may_be_person(stats: AnyArray, k: int, shape: tuple[int, ...]) -> bool:
     whole = left > 1 and top > 1 and left + width < columns - 1 and top + height < rows - 1
     if not whole or area < _MIN_AREA * rows * columns or max(height, width) < _MIN_LENGTH * rows:
         return False
-    gap = max(3, round(_CLEARANCE * max(height, width)))
+    gap = max(_MIN_CLEARANCE, round(_CLEARANCE * max(height, width)))
     others = stats[1:]
     neighbours = (
         (others[:, 0] < left + width + gap)
