@@ -110,6 +110,8 @@ def _read_lines(path: Path) -> _Lines:
         columns = _header_columns(path, line, first)
     number, numbers = array("q"), array("d")
     for line, fields in rows:
+        if not is_mot and any(map(str.strip, fields[len(first) :])):
+            raise FormatError(path, f"line {line}", f"{len(fields)} fields", f"{len(first)}, as in the header")
         number.append(line)
         numbers.extend(_numbers(path, line, fields, columns))
         if len(number) > limits.ROWS:

@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import json
 import urllib.request
+from base64 import b64encode
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from http.client import HTTPException
 from queue import Empty, Full, Queue
 from threading import Event, Thread
 from typing import Any, Protocol, Self
-from urllib.parse import SplitResult, urlsplit
+from urllib.parse import SplitResult, unquote, urlsplit
 
 from stseg.arrays import Rows
 from stseg.errors import ConfigError
 from stseg.io.extras import load_extra
 from stseg.io.live.live_tables import COLUMNS
 from stseg.io.recording.recording import mask_passwords
+from stseg.io.untrusted.values import printable
 
 _WAITING = 1000
 """Messages that wait for a receiver, one a window."""
@@ -104,9 +106,9 @@ class Publisher:
         while True:
             try:
                 self._receiver.send(message)
-            except OSError as error:
+            except (OSError, ValueError, LookupError, RuntimeError) as error:  # libraries raise many for odd answers
                 if not is_failing:
-                    self._report(f"publishing waits for its receiver ({mask_passwords(str(error))})")
+                    self._report(f"publishing waits for its receiver ({printable(mask_passwords(str(error)))})")
                 is_failing = True
                 if self._leaving.wait(_RETRY) or self._ending.is_set():
                     return False
@@ -126,17 +128,29 @@ class Receiver(Protocol):
         """End the connection."""
 
 
+class _NoRedirects(urllib.request.HTTPRedirectHandler):
+    """A redirect is an error: it would be followed without the message, to any host."""
+
+    def redirect_request(self, *_: object) -> None:
+        """None of them."""
+
+
 class HttpReceiver:
     """Each message is the body of one POST request, of type application/x-ndjson."""
 
     def __init__(self, address: SplitResult) -> None:
-        self._url = address.geturl()
+        self._url = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
+        self._headers = {"Content-Type": "application/x-ndjson"}
+        if address.username is not None:
+            login = f"{unquote(address.username)}:{unquote(address.password or '')}"
+            self._headers["Authorization"] = f"Basic {b64encode(login.encode()).decode()}"
+        self._opener = urllib.request.build_opener(_NoRedirects)
 
     def send(self, message: bytes) -> None:
         """Post it; any answer but success is an error."""
-        request = urllib.request.Request(self._url, message, {"Content-Type": "application/x-ndjson"})
+        request = urllib.request.Request(self._url, message, self._headers)
         try:
-            with urllib.request.urlopen(request, timeout=_TIMEOUT):  # of http or https alone, see `receiver_of`
+            with self._opener.open(request, timeout=_TIMEOUT):  # of http or https alone, see `receiver_of`
                 pass
         except HTTPException as error:
             raise OSError(f"no answer of HTTP: {error!r}") from error

@@ -17,7 +17,7 @@ from stseg.io.runfile.runs import read_run
 from stseg.records.tables import ERROR_RATES
 from stseg.tasks.overview import Overview, per, summarise_run
 from stseg.tasks.slices import write_slice
-from stseg.tasks.sources import COLUMNS, summarise_sources, write_source_pictures
+from stseg.tasks.sources import COLUMNS, recording_warnings, summarise_sources, write_source_pictures
 
 _LONGEST = 8  # tracks on the screen
 _MINUTES = 15  # of the run on the screen
@@ -85,7 +85,7 @@ def _inspect_rig(path: Path, pictures: Path | None, overwrite: bool) -> None:
     for summary in summaries:
         table.add_row(*summary.row())
     console.print(table)
-    for words in (words for summary in summaries for words in summary.warnings()):
+    for words in recording_warnings(recording, summaries):
         console.print(f"warning: {words}", style="yellow", soft_wrap=True)
     if pictures is not None:
         with_frames = write_source_pictures(recording, summaries, pictures, overwrite)

@@ -90,7 +90,7 @@ def run(
     from stseg.engine.workers.workforce import Workforce
     from stseg.io.config_file import read_config
     from stseg.io.recording.rigs import read_recording
-    from stseg.tasks.warnings import rig_warnings
+    from stseg.tasks.warnings import rig_warnings, source_warnings
 
     chosen, workforce = FrameRange.parsed(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_recording(rig), TerminalReporter()
@@ -122,7 +122,7 @@ def run(
     done = track_recording(
         recording, output, resolved, tracker, volume, chosen, workforce, reporter, known=known, overwrite=overwrite
     )
-    for warning in rig_warnings(done):
+    for warning in (*source_warnings(recording), *rig_warnings(done)):
         print(f"stseg: warning: {warning}", file=sys.stderr)
     print(_summary(done))
     if labels is not None:

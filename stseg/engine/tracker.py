@@ -19,6 +19,7 @@ from stseg.geometry import Rig
 from stseg.geometry.rig import greatest_reduction
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.pictures import reduced_view
+from stseg.io.untrusted import limits
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks
 
 
@@ -60,7 +61,7 @@ class Tracker:
         self.rig, self.config, self._tracker = rig, config or Config(), tracker
         self._empty = {name: list(images) for name, images in (empty or {}).items()}
         self._session: Session | None = None
-        self._next = 0
+        self._next, self._is_finished = 0, False
         self._factors: list[int] = []
         self._kinds: list[str] = []
 
@@ -82,6 +83,10 @@ class Tracker:
             return self.add(views.views, views.frame)
         frame = self._next if frame is None else frame
         place = f"frame {frame}"
+        if self._is_finished:
+            raise SourceError(place, "", "a frame set after finish()", "a new Tracker for another recording")
+        if np.ndim(frame) or np.asarray(frame).dtype.kind not in "iu" or frame - self._next > limits.FRAMES:
+            raise SourceError(place, "", f"the number {frame!r}", f"a whole number up to {limits.FRAMES}")
         if frame < self._next:
             raise SourceError(place, "", f"a frame before frame {self._next}", "frames in the order of time")
         observations = in_rig_order(self.rig, views, place)
@@ -99,6 +104,7 @@ class Tracker:
 
     def finish(self) -> list[CommittedFrames]:
         """No more frame sets; the results of all frames that are still open."""
+        self._is_finished = True
         return [] if self._session is None else self._session.finish()
 
     def tracks(self, results: Sequence[CommittedFrames]) -> Tracks:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Bytes, Flags, Floats, Observation
+from stseg.arrays import Bytes, Flags, Floats, Ints, Observation
+from stseg.config import BodyConfig
 from stseg.geometry import Camera, Grid
 from stseg.io.detections.source_detections import SourceDetections, read_source
 from stseg.io.outputs.whole_files import Inputs, make_folder, write_png
@@ -20,6 +21,7 @@ from stseg.reporting.figures import backdrop
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.canvas import outline
 from stseg.reporting.pictures.overlay import grid_picture
+from stseg.view_health.plausibility import box_warnings, pace_warnings, scene_warnings, twin_warnings
 
 COLUMNS = ("camera", "recognised", "frames", "boxes", "a frame", "height px", "score", "feet in area", "classes")
 """Headings of `SourceSummary.row`."""
@@ -39,23 +41,34 @@ class SourceSummary:
     grid: Grid
     detections: SourceDetections | None
     """Those of the source; None where it delivers pixels."""
+    height: float
+    """Mean height of a body, metres."""
 
     @cached_property
     def in_area(self) -> Flags:
         """Whether the middle of each box's lower edge projects into the ground rectangle, bool (n,)."""
-        pixel, grid = self._pixel, self.grid
+        pixel, grid = self.boxes, self.grid
         foot = self.camera.back_project(np.stack([pixel[:, 0] + pixel[:, 2] / 2, pixel[:, 1] + pixel[:, 3]], -1))
         with np.errstate(invalid="ignore"):
             inside = (foot > [grid.x[0], grid.y[0]]) & (foot < [grid.x[1], grid.y[1]])
         return np.asarray(inside.all(axis=1))
 
     @property
-    def _pixel(self) -> Floats:
+    def feet(self) -> tuple[Ints, Floats]:
+        """Frames (n,) and places (n, 2), metres, of the boxes that stand in the area."""
+        pixel, within = self.boxes[self.in_area], self.in_area
+        foot = np.stack([pixel[:, 0] + pixel[:, 2] / 2, pixel[:, 1] + pixel[:, 3]], -1)
+        frame = np.zeros(0, np.int64) if self.detections is None else self.detections.kept.frame[within]
+        return frame, self.camera.back_project(foot)
+
+    @property
+    def boxes(self) -> Floats:
+        """Left, top, width and height of all boxes, pixels, float64 (n, 4); none of a source of pixels."""
         return np.zeros((0, 4)) if self.detections is None else self.detections.kept.pixel
 
     def row(self) -> tuple[str, ...]:
         """Format and contents in words, under `COLUMNS`."""
-        found, pixel = self.detections, self._pixel
+        found, pixel = self.detections, self.boxes
         if found is None:
             return self.camera.name, self.source.source.kind, *[""] * (len(COLUMNS) - 2)
         return (
@@ -72,7 +85,7 @@ class SourceSummary:
 
     def warnings(self) -> Iterator[str]:
         """One sentence for each number that is probably a mistake of the rig file."""
-        name, found, pixel = self.camera.name, self.detections, self._pixel
+        name, found, pixel = self.camera.name, self.detections, self.boxes
         if found is None or not len(pixel):
             return
         if int(found.kept.frame.min()) == 1 and int(found.read.frame.min()) == 1:
@@ -86,6 +99,7 @@ class SourceSummary:
         right = float((pixel[:, 0] + pixel[:, 2]).max())
         if right > 1.2 * self.camera.size[0]:
             yield f"{name}: boxes reach to column {right:.0f} of an image {self.camera.size[0]} pixels wide"
+        yield from box_warnings(self.camera, self.grid, pixel, self.height)
 
     def picture(self, view: Observation, frame: int) -> Bytes:
         """The ground's grid and the boxes of a frame, on the camera's image where there is one."""
@@ -94,7 +108,7 @@ class SourceSummary:
         picture = grid_picture(self.camera, self.grid, image, frame, _PICTURE_WIDTH)
         if self.detections is not None:
             scale = picture.shape[1] / self.camera.size[0]
-            boxes = self._pixel[self.detections.kept.frame == frame - self.source.offset]
+            boxes = self.boxes[self.detections.kept.frame == frame - self.source.offset]
             for left, top, width, height in (boxes * scale).tolist():
                 right, bottom = left + width, top + height
                 corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
@@ -104,8 +118,25 @@ class SourceSummary:
 
 def summarise_sources(recording: Recording) -> list[SourceSummary]:
     """A summary of each camera's source; raises InputError where one cannot be read."""
-    cameras = zip(recording.rig.cameras, recording.sources, strict=True)
-    return [SourceSummary(camera, one, recording.rig.grid, _detections(one, camera)) for camera, one in cameras]
+    cameras, height = zip(recording.rig.cameras, recording.sources, strict=True), body_height(recording)
+    return [SourceSummary(camera, one, recording.rig.grid, _detections(one, camera), height) for camera, one in cameras]
+
+
+def body_height(recording: Recording) -> float:
+    """Mean height of the bodies that a rig watches, metres."""
+    return recording.body.height_mean or BodyConfig.height_mean
+
+
+def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary]) -> list[str]:
+    """One sentence for each number of a rig or its boxes that is probably a mistake."""
+    names, rig = [camera.name for camera in recording.rig.cameras], recording.rig
+    paces = (words for one in summaries for words in pace_warnings(rig.frame_rate, *one.feet, one.height))
+    return [
+        *scene_warnings(rig, body_height(recording)),
+        *(words for summary in summaries for words in summary.warnings()),
+        *twin_warnings(names, [summary.boxes for summary in summaries]),
+        *list(paces)[:1],
+    ]
 
 
 def write_source_pictures(recording: Recording, summaries: list[SourceSummary], folder: Path, overwrite: bool) -> bool:

@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
+from stseg.errors import InputError
 from stseg.io.config_file import parse_config
+from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
+from stseg.tasks.sources import body_height, recording_warnings, summarise_sources
 from stseg.view_health.knock_detection import find_knocks, find_residual_step, views_off
+from stseg.view_health.plausibility import scene_warnings, track_warnings
 from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 _MOVED = 1.0
@@ -18,11 +22,21 @@ def run_warnings(run: Run) -> list[str]:
     """One sentence for everything that a user should look at."""
     body = parse_config(run.provenance.config, f"{run.path}: the configuration").body
     return [
+        *source_warnings(run.recording),
+        *track_warnings(run.frame_rate, run.trajectory),
         *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
         *body_warnings(run.cameras, run.trajectory, run.rates, body),
         *rig_warnings(run),
         *crowd_warnings(run.events),
     ]
+
+
+def source_warnings(recording: Recording) -> list[str]:
+    """One sentence for each number of a rig or its boxes that is probably a mistake; none of sources that are gone."""
+    try:
+        return recording_warnings(recording, summarise_sources(recording))
+    except InputError:
+        return scene_warnings(recording.rig, body_height(recording))
 
 
 def rig_warnings(run: Run) -> list[str]:

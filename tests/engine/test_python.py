@@ -108,6 +108,12 @@ def test_frames_that_are_left_out_are_blind() -> None:
     results = [*tracker.add([boxes] * 4, frame=3), *tracker.add([boxes] * 4, frame=6), *tracker.finish()]
     assert np.concatenate([result.frames for result in results]).tolist() == [3, 4, 5, 6]
     refused(stseg.InputError, "frame 6", tracker.add, [boxes] * 4, frame=6)
+    refused(stseg.InputError, r"frame set after finish", tracker.add, [boxes] * 4)
+
+
+@pytest.mark.parametrize("frame", [float("nan"), 1.5, "2", 10**9])
+def test_numbers_that_are_none_of_a_frame_are_refused(frame: Any) -> None:
+    refused(stseg.InputError, "found the number", stseg.Tracker(RIG).add, [np.zeros((0, 4))] * 4, frame=frame)
 
 
 @pytest.mark.parametrize(

@@ -72,6 +72,7 @@ def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
         ("0,1,2,3,-4,0.5", "line 3: found height -4"),
         ("0,1,x,3,4,0.5", "line 3: found top x, expected a finite number"),
         ("0,1,2,3,4", "line 3: found 5 fields, expected at least 6"),
+        ("0,1,5,2,5,3,4,1", "line 3: found 8 fields, expected 6"),
         ("0.5,1,2,3,4,1", "line 3: found frame 0.5"),
         ("-1,1,2,3,4,1", "line 3: found frame -1"),
         ("1e15,1,2,3,4,1", "line 3: found frame 1e\\+15"),

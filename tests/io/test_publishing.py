@@ -71,6 +71,7 @@ def posted() -> Iterator[tuple[str, list[bytes], list[int]]]:
             if status == 200:
                 bodies.append(body)
             self.send_response(status)
+            self.send_header("Location", "/elsewhere")
             self.end_headers()
 
         def log_message(self, *_: object) -> None:
@@ -94,9 +95,13 @@ def test_rows_arrive_by_http(posted: tuple[str, list[bytes], list[int]]) -> None
     assert parsed(bodies) == EXPECTED
 
 
-def test_a_receiver_that_fails_for_a_while_gets_everything(posted: tuple[str, list[bytes], list[int]]) -> None:
+@pytest.mark.parametrize("failures", [[503, 503], [302], [307]])
+def test_a_receiver_that_fails_for_a_while_gets_everything(
+    posted: tuple[str, list[bytes], list[int]], failures: list[int]
+) -> None:
+    """Redirects are failures: they would be followed without the rows."""
     address, bodies, answers = posted
-    answers += [503, 503]
+    answers += failures
     said: list[str] = []
     with publisher_to(address, said.append) as publisher:
         publisher.append(rows_of(7))
@@ -104,6 +109,13 @@ def test_a_receiver_that_fails_for_a_while_gets_everything(posted: tuple[str, li
         publisher.append(rows_of(8, 9))
     assert parsed(bodies) == EXPECTED
     assert [line.split(" (")[0] for line in said] == ["publishing waits for its receiver", "publishing goes on"]
+
+
+def test_a_receiver_may_ask_for_a_password(posted: tuple[str, list[bytes], list[int]]) -> None:
+    address, bodies, _ = posted
+    with publisher_to(address.replace("://", "://me:s%20cret@")) as publisher:
+        publisher.append(rows_of(7))
+    assert len(bodies) == 1
 
 
 def test_an_answer_that_is_no_http_is_one_line() -> None:

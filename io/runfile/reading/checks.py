@@ -31,7 +31,7 @@ _RANGES: dict[str, tuple[int, int]] = {
     "appearance_count": (0, limits.ROWS),
 }
 """Columns of whole numbers; `view` counts the cameras."""
-_PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "height"), "ghosts": ("x", "y")}
+_PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "height"), "ghosts": ("x", "y", "evidence")}
 """Columns that must be finite; others may be NaN where nothing is known."""
 
 
