@@ -8,20 +8,10 @@ from scipy.stats import multivariate_normal
 from stseg.arrays import Bytes, Floats
 
 
-def gaussian(off: Floats, covariance: Floats) -> float:
-    """Density of a normal distribution in two dimensions."""
-    return float(multivariate_normal.pdf(off, cov=covariance))
-
-
-def mixture(place: Floats, centre: Floats, weight: Floats, covariance: Floats) -> Floats:
-    """Density of a mixture at places, float64 (k,)."""
-    return np.array([sum(w * gaussian(p - c, covariance) for c, w in zip(centre, weight, strict=True)) for p in place])
-
-
 def potential(ground: Floats, mapped: Floats, covariance: Floats, share: float, mean: Floats, spread: float) -> float:
     """psi of one ground particle and one of a view (DP06 eq. 12)."""
-    stray = gaussian(ground - mean, np.eye(2) * spread**2)
-    return share * stray + (1 - share) * gaussian(ground - mapped, covariance)
+    stray = multivariate_normal.pdf(ground, mean, spread**2)
+    return float(share * stray + (1 - share) * multivariate_normal.pdf(ground, mapped, covariance))
 
 
 def exclusion(ground: Floats, place: Floats, weight: Floats, apart: float) -> float:

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import combinations, permutations
+from itertools import combinations
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
-from scipy.stats import multivariate_normal
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.bodies.box_fit import EDGE_GRAIN, TOLERANCE
@@ -18,36 +17,17 @@ from stseg.occupancy.visible_cells import SHOULDER
 from stseg.records.people import Explanation
 
 
-def normal(off: float, variance: float) -> float:
-    """Log-density of a normal distribution, nats."""
-    return -0.5 * off**2 / variance - 0.5 * math.log(2 * math.pi * variance)
-
-
-def normal_place(off: Floats, covariance: Floats) -> float:
-    """Log-density of a normal distribution on the ground, nats."""
-    return float(multivariate_normal.logpdf(off, cov=covariance))
-
-
 def best_pairs(gain: Floats) -> list[tuple[int, int]]:
     """Pairs of row and column, one to one, of the greatest sum; none that gains nothing."""
     rows, columns = linear_sum_assignment(np.minimum(-gain, 0.0))
     return [(j, k) for j, k in zip(rows.tolist(), columns.tolist(), strict=True) if gain[j, k] > 0]
 
 
-def most_of_pairs(gain: Floats, row: int = 0, free: frozenset[int] | None = None) -> float:
-    """The most that any pairs, one to one, gain; by trying all."""
-    if row == len(gain):
-        return 0.0
-    columns = frozenset(range(gain.shape[1])) if free is None else free
-    tried = [float(gain[row, k]) + most_of_pairs(gain, row + 1, columns - {k}) for k in columns]
-    return max([most_of_pairs(gain, row + 1, columns), *tried])
-
-
 def away_from_border(open_to_people: Flags, cell: float) -> Floats:
     """Distance of each cell's centre to the nearest centre outside, less half a cell; metres, 0 outside."""
-    inside = np.pad(open_to_people, 1)
-    away = np.zeros(inside.shape)
-    away[inside] = (cdist(np.argwhere(inside), np.argwhere(~inside)).min(axis=1) - 0.5) * cell
+    framed = np.pad(open_to_people, 1)
+    away = np.zeros(framed.shape)
+    away[framed] = (cdist(np.argwhere(framed), np.argwhere(~framed)).min(1) - 0.5) * cell
     return away[1:-1, 1:-1]
 
 
@@ -258,12 +238,7 @@ def left_to_cell(
 ) -> tuple[float, float]:  # fmt: skip
     """How much of a cell's footprint a view sees past nearer people, and the mean likelihood that is the cell's there.
 
-    Parameters
-    ----------
-    near
-        The person near the cell, -1 for nobody.
-    away, people_away
-        Distances of the cell and of all people from the camera along the ground, metres.
+    `near` is the person near the cell, -1 for nobody; distances are from the camera along the ground, metres.
     """
     step = explanation.raster_step[view]
     visible, total, pixels = 0, 0.0, list(pixels_of(footprint))
@@ -325,14 +300,3 @@ def least_energy(energy: GridEnergy) -> tuple[int, Flags]:
     for p, q, b in neighbours(energy):
         total += b * (labels[:, p] != labels[:, q])
     return int(total.min()), labels[total == total.min()].all(0).reshape(energy.unary.shape)
-
-
-# Assignments
-
-
-def least_assignment(cost: Floats, restricted: float) -> float:
-    """Least total of a one-to-one assignment in which a pair that stays apart costs `restricted`; by trying all."""
-    rows, columns = cost.shape
-    wide = np.minimum(cost, restricted)
-    wide = np.pad(wide, ((0, max(columns - rows, 0)), (0, max(rows - columns, 0))), constant_values=restricted)
-    return min(float(sum(wide[i, j] for i, j in enumerate(order))) for order in permutations(range(len(wide))))

@@ -1,9 +1,9 @@
 """What a frame teaches of one view's rates by its definition, cell by cell: slow, plain."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.geometry.summed_area import TOP_LEVEL, Levels
@@ -18,15 +18,9 @@ class Shown(NamedTuple):
 
 
 def counts(
-    shown: Shown,
-    view: int,
-    near: Ints,
-    inside: Flags,
-    trusted: Flags,
-    rates: list[ErrorRates],
-    looks: float,
+    shown: Shown, view: int, near: Ints, inside: Flags, trusted: Flags, rates: list[ErrorRates], worth: float,
     prior: float,
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Errors and chances of m, b and b' in cells; all views weigh the same."""
     errors, seen = np.zeros(3), np.zeros(3)
     for cell in np.ndindex(*inside.shape):
@@ -36,10 +30,8 @@ def counts(
         likelihood, person, mine = int(level) / TOP_LEVEL, near[cell[1:]], rates[view]
         if person < 0:
             others = [i for i in range(len(rates)) if i != view and shown.levels[i][cell] >= 0]
-            said = sum(
-                float(shown.share[i][cell]) * float(log_odds_terms(rates[i])[0, shown.levels[i][cell]]) for i in others
-            )
-            empty = share / (1 + math.exp(prior + looks * said))
+            terms = [shown.share[i][cell] * log_odds_terms(rates[i])[0, shown.levels[i][cell]] for i in others]
+            empty = share * float(expit(-prior - worth * sum(terms)))
             errors[1] += empty * _posterior(mine.clutter, likelihood)
             seen[1] += empty
         elif trusted[person]:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve
+from scipy.special import expit
 
 from stseg.arrays import Boxes, Bytes, Floats, Singles
 from stseg.config import BackgroundConfig, ChromaticConfig, CodebookConfig, MixtureConfig
@@ -272,12 +274,9 @@ def follow(
 
 def pooled(values: Floats, radius: int) -> Floats:
     """Logistic function of the mean around each pixel, by weights that fall straight along each axis."""
-    out = np.empty(values.shape)
-    row, column = np.indices(values.shape)
-    for v, u in np.ndindex(*values.shape):
-        weight = np.maximum(radius + 1 - np.abs(row - v), 0) * np.maximum(radius + 1 - np.abs(column - u), 0)
-        out[v, u] = 1 / (1 + math.exp(-(weight * values).sum() / weight.sum()))
-    return out
+    tent = radius + 1.0 - np.abs(np.arange(-radius, radius + 1))
+    total, weight = (convolve(each, np.outer(tent, tent), mode="constant") for each in (values, np.ones_like(values)))
+    return np.asarray(expit(total / weight))
 
 
 def commonest(frames: NDArray[np.uint8], reach: float) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Projection by other means: a 3x4 matrix, point by point, and OpenCV's own function."""
+"""Projection by other means: a 3x4 matrix, and OpenCV's own function."""
 
 import cv2
 import numpy as np
@@ -8,11 +8,8 @@ from stseg.arrays import Floats
 
 def project_by_matrix(projection: Floats, points: Floats) -> Floats:
     """Pixels (n, 2) of points (n, 3) under a 3x4 matrix."""
-    pixels = np.empty((len(points), 2))
-    for row, point in enumerate(points):
-        s, t, w = (sum(float(p) * float(c) for p, c in zip(line, (*point, 1.0), strict=True)) for line in projection)
-        pixels[row] = s / w, t / w
-    return pixels
+    image = np.column_stack([points, np.ones(len(points))]) @ projection.T
+    return np.asarray(image[:, :2] / image[:, 2:])
 
 
 def project_by_opencv(

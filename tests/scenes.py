@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from reference_core import best_pairs
 
-from stseg.arrays import Boxes, Bytes, Floats, Rows, Singles
+from stseg.arrays import Boxes, Bytes, Floats, Rows, Singles, ViewEvidence
 from stseg.bodies.pillars import PROFILE, SILHOUETTE
 from stseg.config import BodyConfig, Config, DetectionConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
@@ -173,6 +173,11 @@ def mask(camera: Camera, standing: Floats) -> Bytes:
 def likelihoods(cameras: Sequence[Camera], standing: Floats) -> list[Singles]:
     """The masks of all cameras as likelihood maps, float32 (v, u)."""
     return [(mask(camera, standing) / np.float32(255)).astype(np.float32) for camera in cameras]
+
+
+def evidence_of(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
+    """Exact silhouettes for "pixels", else a box of each person."""
+    return list(likelihoods(cameras, standing)) if kind == "pixels" else [boxes(one, standing) for one in cameras]
 
 
 def three_people(share: Floats) -> Floats:

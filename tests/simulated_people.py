@@ -47,6 +47,15 @@ def rows_of(people: Mapping[int, tuple[Path, float, range]], noise: float = 0.02
     return rows
 
 
+def committed(rows: Rows) -> Rows:
+    """Rows as a tracker commits them: places of the frame alone."""
+    found = rows.copy()
+    found["raw_x"], found["raw_y"] = rows["x"], rows["y"]
+    found["xx"] = found["yy"] = 0.02
+    found["extent"] = 0.5
+    return found
+
+
 def visit(side: float) -> Path:
     """Someone comes from one side to the middle, stands there from 9 s to 11 s, nearest at 10 s, and goes back."""
     return lambda t: (side * (0.1 + 0.02 * abs(t - 10) + 0.5 * max(abs(t - 10) - 1, 0)), 0.0)

@@ -1,17 +1,16 @@
 """The tracker `particles`: each equation of KD06 against a plain one, and people followed by the colours of clothes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import reference_particles as plain
+from coloured_people import RIG, SHIRTS, follow, frame_of, observations_of, painted, rows_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import CONFIG, SIZE, corner_cameras, found, looking, mask, people, room
+from scenes import CONFIG, SIZE, corner_cameras, looking, mask, people
 
-from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
+from stseg.arrays import Boxes, Floats, Observation, Rows, Singles
 from stseg.baselines.colour_views import colour_views
 from stseg.baselines.kim_davis_2006.appearance import SAMPLES, PersonAppearance
 from stseg.baselines.kim_davis_2006.axes import HYPOTHESIS_WEIGHT, _middle_of_shortest_half, fill_axes, intersect_axes
@@ -24,44 +23,13 @@ from stseg.baselines.kim_davis_2006.segmentation import NO_PERSON, Canvas, fill_
 from stseg.baselines.kim_davis_2006.tracker import ParticleTracker
 from stseg.baselines.kim_davis_2006.views import ParticleView
 from stseg.config import Config, ParticleConfig
-from stseg.errors import ConfigError, SourceError
+from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.kernels.accelerate import python_form
-from stseg.records.sparse_volume import SparseVolume
-from stseg.trackers import Commit, FrameObservations, FusedFrame
+from stseg.trackers import FrameObservations
 
-RIG = room()
 CAMERA = corner_cameras()[0]
 INTERPRETED = python_form(segment) is segment
-SHIRTS = ((40, 40, 200), (200, 60, 40), (50, 170, 60), (180, 170, 40))
-"""BGR of the clothes of four people."""
-FLOOR = (120, 128, 134)
-
-
-def painted(camera: Camera, standing: Floats, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> Bytes:
-    """A camera's image of people in plain clothes, the nearest in front."""
-    image = np.full((camera.size[1], camera.size[0], 3), FLOOR, np.uint8)
-    away = np.hypot(*(standing[:, :2] - camera.centre[:2]).T)
-    for k in np.argsort(-away):
-        image[mask(camera, standing[k : k + 1]) > 127] = shirts[k]
-    return image
-
-
-def shown(standing: Floats, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> FrameObservations:
-    """What the four cameras show of people, and perfect foreground."""
-    likelihood = [(mask(camera, standing) / np.float32(255)).astype(np.float32) for camera in RIG.cameras]
-    return FrameObservations([painted(camera, standing, shirts) for camera in RIG.cameras], likelihood)
-
-
-def scene(frame: int, standing: Floats) -> FusedFrame:
-    """A frame in which the pass finds these people."""
-    return FusedFrame(
-        frame, found(standing), found(people()), SparseVolume.whole(np.full(RIG.grid.shape, -3.0, np.float32))
-    )
-
-
-def rows_of(commits: list[Commit]) -> Rows:
-    return np.concatenate([commit.trajectory for commit in commits])
 
 
 def bodies_of(camera: Camera, standing: Floats) -> Floats:
@@ -96,7 +64,7 @@ def test_normalised_colours_forget_the_light() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_density_is_equation_1(seed: int) -> None:
     rng = np.random.default_rng(seed)
     colour = rng.integers(90, 130, (3, 4, 3), np.uint8)
@@ -123,7 +91,7 @@ def test_histograms_share_out_their_samples() -> None:
 
 
 @given(GROUPS)
-@settings(max_examples=5 if not INTERPRETED else 2, deadline=None)
+@settings(max_examples=5 if not INTERPRETED else 2)
 def test_segmentation_is_equations_2_to_4(standing: Floats) -> None:
     ideal, rng = raster(CAMERA), np.random.default_rng(3)
     shape = ideal.shape[:2]
@@ -149,15 +117,10 @@ def test_boxes_hold_all_that_a_body_may_cover() -> None:
     bodies, boxes = bodies_of(CAMERA, standing), np.zeros((2, 4), np.int64)
     fill_boxes(ideal, bodies, np.array([0.0, 0.4]), boxes)
     for k, person in enumerate(standing):
-        shares = np.array(
-            [
-                [plain.covered(*plain.place(CAMERA, person[:2], person[2], pixel.astype(float))) for pixel in row]
-                for row in ideal[::4, ::4]
-            ]
-        )
         inside = np.zeros(ideal.shape[:2], bool)
         inside[slice(*boxes[k, :2]), slice(*boxes[k, 2:])] = True
-        assert (shares[~inside[::4, ::4]] < 0.01).all()
+        for pixel in ideal[::4, ::4][~inside[::4, ::4]].astype(float):
+            assert plain.covered(*plain.place(CAMERA, person[:2], person[2], pixel)) < 0.01
     far = bodies_of(CAMERA, people((-30.0, -30.0)))
     fill_boxes(ideal, far, np.zeros(1), boxes[:1])
     assert (boxes[0, 1::2] <= boxes[0, ::2]).all()  # behind the camera
@@ -169,11 +132,8 @@ def test_what_is_open_is_in_front() -> None:
     standing = people(tuple(way * -0.4), tuple(way * 0.4))
     ideal = raster(CAMERA, 2)
     bodies, shape = bodies_of(CAMERA, standing), ideal.shape[:2]
-    owner, lone, free = (
-        np.full(shape, NO_PERSON, np.int32),
-        np.full(shape, NO_PERSON, np.int32),
-        np.zeros(shape, np.float32),
-    )
+    owner, lone = np.full((2, *shape), NO_PERSON, np.int32)
+    free = np.zeros(shape, np.float32)
     seen, alone, boxes = np.zeros(2, np.int64), np.zeros(1, np.int64), plain.boxes_everywhere(2, shape)
     fill_unoccluded(bodies, np.array([0, 1]), boxes, ideal, HALF_WIDTH, PARTS, free, owner, seen)
     fill_unoccluded(bodies[1:], np.array([0]), boxes[:1], ideal, HALF_WIDTH, PARTS, free, lone, alone)
@@ -187,12 +147,12 @@ def test_what_is_open_is_in_front() -> None:
 
 
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=25))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_middle_of_the_shortest_half_is_the_least_median(distances: list[float]) -> None:
-    given_ = np.array(distances)
-    middle = _middle_of_shortest_half(given_.copy())
+    array = np.array(distances)
+    middle = _middle_of_shortest_half(array.copy())
     half = len(distances) // 2
-    assert np.sort(np.abs(given_ - middle))[half] == pytest.approx(plain.median_line(given_), abs=1e-9)
+    assert np.sort(np.abs(array - middle))[half] == pytest.approx(plain.median_line(array), abs=1e-9)
 
 
 @pytest.mark.parametrize("median", [False, True])
@@ -221,7 +181,7 @@ def test_the_median_forgets_an_arm() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0, np.pi, (views, 2))
@@ -238,7 +198,7 @@ def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
 
 
 @given(GROUPS)
-@settings(max_examples=6 if not INTERPRETED else 1, deadline=None)
+@settings(max_examples=6 if not INTERPRETED else 1)
 def test_misfit_is_equations_6_and_7(standing: Floats) -> None:
     ideal, rng = raster(CAMERA, 8), np.random.default_rng(5)
     shape, bodies = ideal.shape[:2], bodies_of(CAMERA, standing)
@@ -288,14 +248,11 @@ def test_appearances_fill_and_are_renewed_slowly() -> None:
 # The tracker
 
 
-def follow(frames: int, config: Config = CONFIG, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> list[Commit]:
-    """Two who pass each other; the pass finds them in the first four frames alone."""
-    tracker, commits = ParticleTracker(RIG, config, 0), []
-    for frame in range(frames):
-        x = -1.2 + 0.1 * frame
-        standing = people((x, -0.3), (-x, 0.3))
-        commits += tracker.add(scene(frame, standing if frame < 4 else people()), shown(standing, shirts))
-    return commits + tracker.finish()
+def passing(config: Config, frames: int) -> Rows:
+    """Rows of two who pass each other; the pass finds them in the first four frames alone."""
+    tracker = ParticleTracker(RIG, config, 0)
+    commits = follow(tracker, frames, ((-1.2, -0.3, 0.1, 0.0), (1.2, 0.3, -0.1, 0.0)), found_until=4)
+    return rows_of(commits + tracker.finish())
 
 
 QUICK = replace(CONFIG, particles=ParticleConfig(particles=6, raster_columns=64, patience=10.0))
@@ -303,7 +260,7 @@ FRAMES = 6 if INTERPRETED else 16
 
 
 def test_people_are_followed_by_their_colours() -> None:
-    rows = rows_of(follow(FRAMES, QUICK))
+    rows = passing(QUICK, FRAMES)
     assert np.unique(rows["id"]).tolist() == [1, 2]
     assert len(rows) == 2 * FRAMES
     x = np.where(rows["id"] == 1, -1.2 + 0.1 * rows["frame"], 1.2 - 0.1 * rows["frame"])
@@ -314,8 +271,7 @@ def test_people_are_followed_by_their_colours() -> None:
 
 
 def test_equal_seeds_make_equal_tracks() -> None:
-    one, same = rows_of(follow(4, QUICK)), rows_of(follow(4, QUICK))
-    other = rows_of(follow(4, replace(QUICK, particles=replace(QUICK.particles, seed=1))))
+    one, same, other = (passing(replace(QUICK, particles=replace(QUICK.particles, seed=seed)), 4) for seed in (0, 0, 1))
     np.testing.assert_array_equal(one, same)
     assert (one["x"] != other["x"]).any()
 
@@ -323,7 +279,7 @@ def test_equal_seeds_make_equal_tracks() -> None:
 def test_the_search_goes_to_the_person_from_beside() -> None:
     standing = people((0.2, 0.1))
     views = [ParticleView(camera, 64) for camera in RIG.cameras]
-    colour = colour_views(shown(standing), "particles", 0)
+    colour = colour_views(observations_of(standing), "particles", 0)
     rng, appearance = np.random.default_rng(0), PersonAppearance.unknown()
     shirt = normalised(np.array([[SHIRTS[0]]], np.uint8)).reshape(1, 3).repeat(SAMPLES, 0)
     for part in range(len(PARTS)):
@@ -347,24 +303,18 @@ def test_the_search_goes_to_the_person_from_beside() -> None:
 def test_who_is_not_found_or_leaves_is_followed_no_longer() -> None:
     config = replace(QUICK, particles=replace(QUICK.particles, patience=0.5))
     tracker = ParticleTracker(RIG, config, 0)
-    away, nobody = people((0.0, 0.0)), people()
-    events = []
-    for frame in range(7):
-        commits = tracker.add(scene(frame, away if frame < 2 else nobody), shown(away))
-        events += [(int(e["frame"]), bytes(e["kind"]), bytes(e["reason"])) for e in commits[0].events]
+    commits = follow(tracker, 7, [(0.0, 0.0, 0.0, 0.0)], found_until=2)
+    events = np.concatenate([commit.events for commit in commits])[["frame", "kind", "reason"]].tolist()
     assert events == [(0, b"birth", b"found where nobody was followed"), (6, b"death", b"not found for 0.5 s")]
 
 
 def test_who_was_lost_is_known_again_where_somebody_is_found() -> None:
     """The particles are a metre off; the pass finds somebody in the old clothes where nobody is followed."""
     standing, tracker = people((-0.5, 0.2)), ParticleTracker(RIG, QUICK, 0)
-    for frame in range(3):
-        tracker.add(scene(frame, standing), shown(standing))
-    away = np.array([1.0, 0.2])
-    tracker.crowd = replace(
-        tracker.crowd, ground=tracker.crowd.ground + away, particles=tracker.crowd.particles + away
-    )  # fmt: skip
-    (commit,) = tracker.add(scene(3, standing), shown(standing))
+    follow(tracker, 3, [(-0.5, 0.2, 0.0, 0.0)])
+    away, crowd = np.array([1.0, 0.2]), tracker.crowd
+    tracker.crowd = replace(crowd, ground=crowd.ground + away, particles=crowd.particles + away)
+    (commit,) = tracker.add(frame_of(3, standing), observations_of(standing))
     assert commit.trajectory["id"].tolist() == [1]
     assert np.hypot(commit.trajectory["x"] + 0.5, commit.trajectory["y"] - 0.2)[0] < 0.15
     assert len(commit.events) == 0
@@ -377,27 +327,21 @@ def test_without_colour_it_says_what_it_lacks() -> None:
     for observations, kind in ((masks, "masks"), (boxes, "boxes"), (masks[:2] + boxes[:2], "boxes and masks")):
         tracker = ParticleTracker(RIG, QUICK, 0)
         with pytest.raises(SourceError, match=f"particles.*frame 3.*{kind} and no colour"):
-            tracker.add(scene(3, standing), FrameObservations(observations, [None] * 4))
+            tracker.add(frame_of(3, standing), FrameObservations(observations, [None] * 4))
 
 
 def test_one_camera_in_colour_is_enough() -> None:
     standing = people((0.0, 0.0))
-    full = shown(standing)
+    full = observations_of(standing)
     tracker = ParticleTracker(RIG, QUICK, 0)
     alone = FrameObservations(
         [full.observations[0], mask(RIG.cameras[1], standing), None, None],
         [full.evidence[0], full.evidence[1], None, None],
     )
     blind = FrameObservations([None] * 4, [None] * 4)
-    rows = rows_of([*tracker.add(scene(0, standing), alone), *tracker.add(scene(1, standing), blind)])
+    rows = rows_of([*tracker.add(frame_of(0, standing), alone), *tracker.add(frame_of(1, standing), blind)])
     assert rows["id"].tolist() == [1, 1]
     assert [view is not None for view in colour_views(alone, "particles", 0)] == [True, False, False, False]
-
-
-def test_settings_out_of_range_are_refused() -> None:
-    for bad in ({"particles": 0}, {"velocity_spread": 0.0}, {"seed": -1}, {"patience": -1.0}):
-        with pytest.raises(ConfigError):
-            ParticleConfig(**bad)
 
 
 def test_a_lens_bends_the_raster_not_the_people() -> None:
@@ -407,10 +351,8 @@ def test_a_lens_bends_the_raster_not_the_people() -> None:
     silhouette = (mask(camera, standing) / np.float32(255)).astype(np.float32)
     seen = colour_views(FrameObservations([painted(camera, standing)], [silhouette]), "particles", 0)[0]
     assert seen is not None
-    frame, axes = (
-        view.prepare(seen, standing[:, :2], standing[:, 2], [PersonAppearance.unknown()], np.array([0.3])),
-        np.zeros((1, 4)),
-    )
+    frame = view.prepare(seen, standing[:, :2], standing[:, 2], [PersonAppearance.unknown()], np.array([0.3]))
+    axes = np.zeros((1, 4))
     frame.fill_axes(standing[:, :2], True, axes)
     assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < 0.05
     assert axes[0, 3] > 0.5

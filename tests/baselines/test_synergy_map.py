@@ -1,9 +1,5 @@
 """Plain localisation: means over footprints and fusion by definition, any reference plane, any number of views."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 import pytest
@@ -11,6 +7,7 @@ import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, found, likelihoods, looking, people, rig_of
+from scipy.special import logit
 
 from stseg.arrays import Floats, Singles
 from stseg.baselines.khan_shah_2009.synergy_map import Localiser, fill_means, synergy_terms
@@ -31,35 +28,27 @@ COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
 
 def noise(seed: int, views: int = 4) -> list[Singles]:
     """A random map in whole levels for each view."""
-    rng = np.random.default_rng(seed)
-    return [
-        np.asarray(np.rint(rng.random((96, 128)) ** (k + 1) * TOP_LEVEL) / TOP_LEVEL, np.float32) for k in range(views)
-    ]
-
-
-def box_rows(rng: np.random.Generator, width: int, height: int, number: int) -> list[list[int]]:
-    """Random boxes inside an image: left, top, width, height."""
-    first = rng.integers(0, (width, height), (number, 2))
-    rows: list[list[int]] = np.concatenate([first, rng.integers(1, np.array([width, height]) - first + 1)], 1).tolist()
-    return rows
+    level = np.random.default_rng(seed).random((views, 96, 128)) ** np.arange(1, views + 1)[:, None, None] * TOP_LEVEL
+    return list((np.rint(level) / TOP_LEVEL).astype(np.float32))
 
 
 # Summed-area tables
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(1, 30), st.integers(1, 30), st.integers(0, 999))
 def test_means_over_footprints_by_definition(width: int, height: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     likelihood = rng.random((height, width)).astype(np.float32)
-    boxes = box_rows(rng, width, height, 6)
-    footprint = np.array([*boxes, [0, 0, 0, 0]], np.int16).reshape(1, 1, -1, 4)
+    first = rng.integers(0, (width, height), (6, 2))
+    boxes = np.concatenate([first, rng.integers(1, np.array([width, height]) - first + 1)], 1)
+    footprint = np.append(boxes, [[0] * 4], 0).astype(np.int16).reshape(1, 1, -1, 4)
     sums, levels = np.empty((height + 1, width + 1), np.uint32), np.empty((1, 1, 7), np.int16)
     fill_summed_area(likelihood, 0, 0, sums)
     fill_means(sums, footprint, 0, 0, levels)
     assert levels[0, 0, -1] == UNSEEN
-    for box, level in zip(boxes, levels[0, 0], strict=False):
-        mean = np.mean([likelihood[v, u] for v, u in reference.pixels_of(box)])
+    for (left, top, wide, high), level in zip(boxes, levels[0, 0], strict=False):
+        mean = likelihood[top : top + high, left : left + wide].mean()
         assert level / TOP_LEVEL == pytest.approx(mean, abs=1.01 / TOP_LEVEL)
 
 
@@ -85,7 +74,7 @@ def test_what_is_no_likelihood_becomes_one(value: float) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("blind", [None, 1])
 def test_localisation_by_definition(kind: SamplingKind, blind: int | None) -> None:
-    rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=150.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
+    rig = rig_of([looking(f"cam{x}{y}", (x, y, 2.6), focal=150.0) for x, y in ((-3, -3), (3, -3), (3, 3))])
     maps: list[Singles | None] = [*noise(3, 3)]
     if blind is not None:
         maps[blind] = None
@@ -101,18 +90,15 @@ def test_localisation_by_definition(kind: SamplingKind, blind: int | None) -> No
         assert n_vis[cell] == len(seeing)
         assert np.isnan(synergy[cell]) == np.isnan(log_odds[cell]) == (static[cell] == 0)
         if seeing:
-            shown = [
+            means = [
                 np.mean([maps[i][v, u] for v, u in reference.pixels_of(footprint[(i, *cell)])])  # type: ignore[index]
                 for i in seeing
             ]
-            whole = [1.0] * len(seeing)
-            by_eq_7 = reference.fused(np.log(np.maximum(shown, 0.05)).tolist(), weights[seeing].tolist(), whole)
-            terms = [reference.log_odds_term(float(m), rates[i]) for m, i in zip(shown, seeing, strict=True)]
-            prior = np.log(OCCUPIED / (1 - OCCUPIED))
+            weight, whole = weights[seeing].tolist(), [1.0] * len(seeing)
+            by_eq_7 = reference.fused(np.log(np.maximum(means, 0.05)).tolist(), weight, whole)
+            terms = [reference.log_odds_term(float(m), rates[i]) for m, i in zip(means, seeing, strict=True)]
             assert synergy[cell] == pytest.approx(by_eq_7, abs=0.01)
-            assert log_odds[cell] == pytest.approx(
-                prior + reference.fused(terms, weights[seeing].tolist(), whole), abs=0.02
-            )
+            assert log_odds[cell] == pytest.approx(logit(OCCUPIED) + reference.fused(terms, weight, whole), abs=0.02)
 
 
 def test_nobody_explained_is_the_plain_localisation() -> None:
@@ -121,13 +107,11 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     owner, free = (np.full((96, 128), -1, np.int16),) * 4, (np.zeros(0, np.int64),) * 4
     explanation = Explanation(nobody, nobody, owner, (1,) * 4, free, np.full(4, np.nan))
     localiser = Localiser(COARSE, "footprint")
-    rates = [
-        ErrorRates(FEW_HEIGHTS.pixel_miss_rate, FEW_HEIGHTS.pixel_clutter_rate, FEW_HEIGHTS.pixel_clutter_rate)
-    ] * 4
-    plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, OccupancyConfig().occupied_share)
-    explained = Occupancy(
-        COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", effective_observations=1.0), FEW_HEIGHTS, BODY
-    )
+    clutter = FEW_HEIGHTS.pixel_clutter_rate
+    rates = [ErrorRates(FEW_HEIGHTS.pixel_miss_rate, clutter, clutter)] * 4
+    config = OccupancyConfig(sampling="footprint", effective_observations=1.0)
+    plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, config.occupied_share)
+    explained = Occupancy(COARSE, ["pixels"] * 4, config, FEW_HEIGHTS, BODY)
     np.testing.assert_array_equal(explained.fuse([*maps], explanation).dense(), plain)
 
 
@@ -169,22 +153,19 @@ def test_far_views_do_not_blur() -> None:
 # Any reference plane
 
 
-def boxes_as_masks(cameras: Sequence[Camera], low: Floats, high: Floats) -> list[Singles]:
-    """Silhouettes of a box of the world."""
+def box_mask(camera: Camera, low: Floats, high: Floats) -> Singles:
+    """The silhouette of a box of the world."""
     corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3)
-    masks = []
-    for camera in cameras:
-        pixel, _ = camera.project(corners[:, :2], corners[:, 2])
-        mask = np.zeros(camera.size[::-1], np.float32)
-        cv2.fillConvexPoly(mask, cv2.convexHull(np.rint(pixel).astype(np.int32)), 1.0)
-        masks.append(mask)
-    return masks
+    pixel, _ = camera.project(corners[:, :2], corners[:, 2])
+    mask = np.zeros(camera.size[::-1], np.float32)
+    cv2.fillConvexPoly(mask, cv2.convexHull(np.rint(pixel).astype(np.int32)), 1.0)
+    return mask
 
 
 def test_a_wall_is_as_good_a_reference_plane_as_the_ground() -> None:
     """The cells of a cube, as planes above the ground and as planes before its wall y = -1.1, are the same cells."""
     cameras = [looking(f"cam{k}", (x, y, 2.2), (0, 0, 0.9)) for k, (x, y) in enumerate([(-4, 3), (0, 5), (4, 3.5)])]
-    masks = boxes_as_masks(cameras, np.array([-0.3, -0.3, 0.0]), np.array([0.3, 0.1, 1.5]))
+    masks = [box_mask(camera, np.array([-0.3, -0.3, 0.0]), np.array([0.3, 0.1, 1.5])) for camera in cameras]
     ground = Grid((-1.2, 1.2), (-1.2, 1.2), 0.2, 2.2, 12)
     upright = Rig("ground", 5.0, ground, tuple(cameras))
     # x of the wall runs to the world's -x, y up, its normal into the room along +y: a right-handed frame.
@@ -216,12 +197,16 @@ def test_ten_planes_unless_somebody_says_otherwise() -> None:
 # Coverage
 
 
+def fine_views(views: int) -> Localiser:
+    """So many cameras in one place, above fine cells of one plane."""
+    cameras = [looking(f"cam{k}", (0.0, -3.5, 2.6), focal=60.0) for k in range(views)]
+    return Localiser(rig_of(cameras, cell=0.04, planes=1), "point")
+
+
 @pytest.mark.parametrize("views", [1, 2, 3, 5, 8])
 def test_empty_cells_are_not_occupied_in_many_views(views: int) -> None:
     """With the true rates, at most pi / (1 - pi) of the empty cells come to log-odds above 0 (Markov's inequality)."""
-    rig = rig_of([looking(f"cam{k}", (0.0, -3.5, 2.6), focal=60.0) for k in range(views)], cell=0.04, planes=1)
-    rng = np.random.default_rng(views)
-    localiser = Localiser(rig, "point")
+    rng, localiser = np.random.default_rng(views), fine_views(views)
     empty = [(rng.random((96, 128)) < RATES.clutter).astype(np.float32) for _ in range(views)]
     bodies = [(rng.random((96, 128)) > RATES.miss).astype(np.float32) for _ in range(views)]
     pi, equal = 0.1, np.ones(views)
@@ -236,8 +221,7 @@ def test_cells_of_few_views_fill_under_a_mean_alone() -> None:
     rng = np.random.default_rng(0)
     false_mean, false_u = {}, {}
     for views in (2, 4, 8):
-        rig = rig_of([looking(f"cam{k}", (0.0, -3.5, 2.6), focal=60.0) for k in range(views)], cell=0.04, planes=1)
-        localiser = Localiser(rig, "point")
+        localiser = fine_views(views)
         empty = [(rng.random((96, 128)) < RATES.clutter).astype(np.float32) for _ in range(views)]
         equal = np.ones(views)
         mean = localiser.synergy(empty, equal, 0.05) / views

@@ -1,7 +1,5 @@
 """Bodies in a view: boxes and discs from the table against points of the body, projected one by one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -30,7 +28,7 @@ TABLES = {name: BodyTable.of(camera, GRID) for name, camera in VIEWS.items()}
 
 
 @pytest.mark.parametrize("view", VIEWS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(1.3, 2.0))
 def test_a_box_is_that_of_the_bodys_points(view: str, x: float, y: float, height: float) -> None:
     expected = body_box(VIEWS[view], np.array([x, y, height]))
@@ -69,7 +67,6 @@ def test_nobody_is_seen_behind_the_camera() -> None:
     assert np.isfinite(found[:, 1]).all()
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(numbers(-2, 2), numbers(-2, 2), numbers(1.3, 2.0)), min_size=1, max_size=5).map(np.array))
 def test_a_height_each_or_all_heights(standing: Floats) -> None:
     table = TABLES["barrel"]

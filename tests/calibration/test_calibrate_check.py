@@ -1,9 +1,6 @@
 """The check of a rig by boxes, and the page for clicking points."""
 
-from __future__ import annotations
-
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from browser import CHROMIUM, Page, chromium
+from recordings import data_path
 from refusals import refused
 from simulated_people import SIZE, exchanged, moved, ring, shown, walkers
 
@@ -33,10 +31,13 @@ from stseg.reporting.pictures.overlay import grid_picture
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig
 
-DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 RIG = ring()
 WALK = walkers(40)
 SHOWN = shown(RIG, WALK)
+
+
+def run(*tokens: str) -> None:
+    app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
 
 
 def judged(rig: Rig, boxes: dict[int, list[Floats]] | None = None) -> tuple[Check, list[str]]:
@@ -44,7 +45,7 @@ def judged(rig: Rig, boxes: dict[int, list[Floats]] | None = None) -> tuple[Chec
     return check, verdict_text(rig, check)
 
 
-class TestSightings:
+class TestBoxes:
     def test_blobs_are_boxed_and_noise_is_not(self) -> None:
         likelihood = np.full((480, 640), 0.02, np.float32)
         likelihood[100:300, 50:110] = 0.99
@@ -57,7 +58,7 @@ class TestSightings:
         assert isolated_boxes(None, SIZE).shape == (0, 4)
 
 
-class TestBystanders:
+class TestPeople:
     def test_people_are_found_where_they_walk(self) -> None:
         tables = tables_of(RIG)
         people = match_frames(RIG, tables, SHOWN, range(0, 40, 4))
@@ -90,9 +91,9 @@ class TestVerdict:
 
     def test_by_how_much(self) -> None:
         check, words = judged(moved(RIG, 2, "u", 30.0))
-        (one,) = check.verdict.named
-        assert one.pixels == pytest.approx(30.0, rel=0.2)
-        assert one.right < -0.2, "the rig says further right, so people show to the left"
+        (view,) = check.verdict.named
+        assert view.pixels == pytest.approx(30.0, rel=0.2)
+        assert view.right < -0.2, "the rig says further right, so people show to the left"
         assert "to the left" in words[0] and " px" in words[0]
 
     def test_two_that_are_off_are_named(self) -> None:
@@ -119,20 +120,15 @@ class TestBlunders:
     def test_swapped_streams_are_named(self, first: int, second: int) -> None:
         check, words = judged(exchanged(RIG, first, second))
         assert check.swapped == (first, second)
-        assert (
-            words[0]
-            == f"cam{first + 1} and cam{second + 1} seem to be swapped: their frames fit far better the other way round"
-        )
+        pair = f"cam{first + 1} and cam{second + 1}"
+        assert words[0] == f"{pair} seem to be swapped: their frames fit far better the other way round"
 
     @pytest.mark.parametrize(("view", "frames"), [(0, 2), (2, -3)])
     def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
         nothing = [np.zeros((0, 4))] * 4
-        boxes = {
-            frame: [
-                SHOWN.get(frame - frames, nothing)[k] if k == view else view_boxes for k, view_boxes in enumerate(views)
-            ]
-            for frame, views in SHOWN.items()
-        }
+        boxes = {frame: list(views) for frame, views in SHOWN.items()}
+        for frame, views in boxes.items():
+            views[view] = SHOWN.get(frame - frames, nothing)[view]
         check, words = judged(RIG, boxes)
         assert [(one.view, one.frames) for one in check.delays] == [(view, frames)]
         side = "late" if frames > 0 else "early"
@@ -177,11 +173,8 @@ class TestCommand:
         write_rig("room.toml", Recording(Path("room.toml"), moved(RIG, 2, "u", 30.0), tuple(sources)))
         return Path("room.toml")
 
-    def check(self, *tokens: str) -> None:
-        app(["check", *tokens], exit_on_error=False, print_error=False, result_action="return_value")
-
     def test_verdict_page_and_pictures(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        self.check(str(rig_file), "-o=check.html", "--pictures=shots")
+        run("check", str(rig_file), "-o=check.html", "--pictures=shots")
         printed = capsys.readouterr().out
         assert "cam3 is off: of " in printed and "it shows camera frames" in printed
         assert sorted(path.name for path in Path("shots").iterdir()) == [
@@ -189,46 +182,29 @@ class TestCommand:
         ]  # fmt: skip
         page = Path("check.html").read_text()
         assert "cam3 is off" in page and page.count("<img") == 5
-        refused(OutputError, r"check.html: found a file that exists", self.check, str(rig_file), "-o=check.html")
+        refused(OutputError, r"check.html: found a file that exists", run, "check", str(rig_file), "-o=check.html")
 
     def test_as_json_of_some_frames(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        self.check(str(rig_file), "--json", "--frames=4:40")
+        run("check", str(rig_file), "--json", "--frames=4:40")
         found = json.loads(capsys.readouterr().out)
         assert found["off"] == ["cam3"] and not found["sound"]
         assert set(found["views"]) == {"cam1", "cam2", "cam3", "cam4"}
-        refused(ConfigError, r"--frames: found '9'", self.check, str(rig_file), "--frames=9")
+        refused(ConfigError, r"--frames: found '9'", run, "check", str(rig_file), "--frames=9")
 
 
-class TestRealRigs:
-    """The rigs of the data sets are right; with one camera moved, that camera is named."""
-
-    @staticmethod
-    def uu4(frames: int) -> tuple[Rig, dict[int, list[Floats]]]:
-        folder = (DATA / "uu4").resolve()
-        if not folder.is_dir():
-            pytest.skip("the data set uu4 is not here: set STSEG_DATA to its parent folder")
-        names = sorted(str(path) for path in folder.glob("cam?/config.xml"))
-        source = (f"--source-pattern={folder}/{{name}}/foreground_cropped.avi", "--source-kind=masks", "-o=real.toml")
-        app(
-            ["import", "opencv", *names, "--size=644,486", "--area=-2.5,-4.5,2.5,1.5", "--frame-rate=5", *source],
-            exit_on_error=False, print_error=False, result_action="return_value",
-        )  # fmt: skip
-        recording = read_recording("real.toml")
-        boxes = {}
-        with open_frames(recording, 0, frames) as moments:
-            for moment in moments:
-                maps = [ViewForeground().evidence(view) for view in moment.views]
-                boxes[moment.frame] = [isolated_boxes(one, (644, 486)) for one in maps]
-        return recording.rig, boxes
-
-    def test_uu4(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("test_calibrate_check.DATA", DATA.resolve())
-        monkeypatch.chdir(tmp_path)
-        rig, boxes = self.uu4(80)
-        assert judged(rig, boxes)[0].sound
-        for view in (3,):
-            check, _ = judged(moved(rig, view, "z", 0.2), boxes)
-            assert [one.view for one in check.verdict.named] == [view]
+def test_a_real_rig_is_right_until_a_camera_is_moved(tmp_path: Path) -> None:
+    folder, path = data_path("uu4").resolve(), tmp_path / "real.toml"
+    names = sorted(str(path) for path in folder.glob("cam?/config.xml"))
+    source = (f"--source-pattern={folder}/{{name}}/foreground_cropped.avi", "--source-kind=masks", f"-o={path}")
+    run("import", "opencv", *names, "--size=644,486", "--area=-2.5,-4.5,2.5,1.5", "--frame-rate=5", *source)
+    recording, boxes = read_recording(path), {}
+    with open_frames(recording, 0, 80) as frame_sets:
+        for frame_set in frame_sets:
+            maps = [ViewForeground().evidence(view) for view in frame_set.views]
+            boxes[frame_set.frame] = [isolated_boxes(likelihood, (644, 486)) for likelihood in maps]
+    assert judged(recording.rig, boxes)[0].sound
+    check, _ = judged(moved(recording.rig, 3, "z", 0.2), boxes)
+    assert [camera.view for camera in check.verdict.named] == [3]
 
 
 # The page
@@ -244,8 +220,7 @@ def make(folder: Path, *more: str, area: str = "-3,-3,3,3") -> Path:
     for camera in CAMERAS:
         cv2.imwrite(str(folder / f"{camera.name}.png"), np.full((360, 480, 3), 90, np.uint8))
     names = [str(folder / f"{camera.name}.png") for camera in CAMERAS]
-    tokens = ["page", *names, f"-o={folder / 'points.html'}", f"--area={area}", *more]
-    app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+    run("page", *names, f"-o={folder / 'points.html'}", f"--area={area}", *more)
     return folder / "points.html"
 
 
@@ -305,16 +280,17 @@ def test_undo_poles_keys_and_the_hint(page: Page) -> None:
     for ground in PLACES[:5]:
         press(page, "n")
         place(page, ground)
-    csv = page.ask("document.getElementById('csv').value")
+    table = "document.getElementById('csv').value"
+    csv = page.ask(table)
     press(page, "ArrowRight", ", shiftKey: true")
-    assert page.ask("document.getElementById('csv').value") != csv
+    assert page.ask(table) != csv
     press(page, "z", ", ctrlKey: true")
-    assert page.ask("document.getElementById('csv').value") == csv
+    assert page.ask(table) == csv
     press(page, "p")
     click(page, "view-cam1", np.array([0.5, 0.3]))
-    assert page.ask("document.getElementById('csv').value").count(",0.0025,-0.0025,2\n") == 1
+    assert page.ask(table).count(",0.0025,-0.0025,2\n") == 1
     press(page, "Delete")
-    assert page.ask("document.getElementById('csv').value") == csv
+    assert page.ask(table) == csv
     yellow = """(() => { const c = document.getElementById('plan'), d = c.getContext('2d')
       .getImageData(0, 0, c.width, c.height).data; let n = 0;
       for (let k = 0; k < d.length; k += 4) n += d[k] > 220 && d[k + 1] > 140 && d[k + 1] < 190 && d[k + 2] < 40;

@@ -1,7 +1,5 @@
 """Calibration from clicked points, and a lens from a rendered video of a checkerboard."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Marks on a floor are found where two views share them, and bring wrong cameras nearer to the truth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Appearance of detections: the colours of trunk and legs by view, features of boxes, and files of features."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -64,16 +62,20 @@ def test_no_people_have_no_rows() -> None:
     assert not len(appearance_rows(0, explanation, TABLES, None, *painted()))
 
 
+def assert_worn(rows: Rows) -> None:
+    """Assert that the first person's rows are bluish, the second's reddish, as they are painted."""
+    for (x, y, _), blue_to_red in zip(STANDING, (1, -1), strict=True):
+        colours = rows["colours"][(rows["x"] == x) & (rows["y"] == y)].reshape(-1, 2, 3)
+        assert len(colours) >= 3
+        difference = np.log(160 + 16) - np.log(40 + 16)
+        np.testing.assert_allclose(colours[..., 0] - colours[..., 2], blue_to_red * difference, atol=0.3)
+
+
 def test_colours_are_those_that_each_person_wears() -> None:
     rows = rows_of(*painted())
     assert set(rows["frame"].tolist()) == {7}
     assert sorted(set(rows["view"].tolist())) == [0, 1, 2, 3]
-    for (x, y, _), blue_to_red in zip(STANDING, (1, -1), strict=True):
-        of_person = rows[(rows["x"] == x) & (rows["y"] == y)]
-        assert len(of_person) >= 3
-        colours = of_person["colours"].reshape(-1, 2, 3)
-        difference = np.log(160 + 16) - np.log(40 + 16)
-        np.testing.assert_allclose(colours[..., 0] - colours[..., 2], blue_to_red * difference, atol=0.3)
+    assert_worn(rows)
     assert np.isnan(rows["features"]).all()
 
 
@@ -121,11 +123,7 @@ def test_colours_beside_boxes_are_those_of_their_middles() -> None:
         assigned[assigned < 0] = 0
     rows = appearance_rows(7, explanation, TABLES, None, likely, likely, views)
     assert not ((rows["view"] == 2) & (rows["x"] == STANDING[0, 0])).any()
-    for (x, _, _), blue_to_red in zip(STANDING, (1, -1), strict=True):
-        of_person = rows["colours"][rows["x"] == x].reshape(-1, 2, 3)
-        assert len(of_person) >= 3
-        difference = np.log(160 + 16) - np.log(40 + 16)
-        np.testing.assert_allclose(of_person[..., 0] - of_person[..., 2], blue_to_red * difference, atol=0.3)
+    assert_worn(rows)
     assert not len(appearance_rows(7, explanation, TABLES, None, likely, likely, [None] * 4))
 
 
@@ -133,9 +131,6 @@ def test_masks_have_no_looks() -> None:
     views, likely = painted()
     assert not len(rows_of([mask(camera, STANDING) for camera in CAMERAS], likely))
     assert not len(rows_of(views, [None] * 4))
-
-
-# Files
 
 
 def source(folder: Path, features: Floats, **more: object) -> Source:
@@ -149,22 +144,17 @@ def source(folder: Path, features: Floats, **more: object) -> Source:
 def test_rows_of_features_are_those_of_the_boxes(tmp_path: Path) -> None:
     """Boxes need not be in the order of frames, and some are left out by their scores."""
     stream = open_stream(source(tmp_path, np.arange(4.0)[:, None] + [0, 10], least_score=0.5), CAMERAS[0])
-    means = [
-        found_boxes
-        for found_boxes in iter(stream.read, None)
-        if isinstance(found_boxes, Boxes) and found_boxes.features is not None
-    ]
-    assert [b.features.tolist() for b in means] == [[[2, 12]], [[3, 13]], [[0, 10]]]  # type: ignore[union-attr]
-    assert [b.pixel[:, 0].tolist() for b in means] == [[20], [30], [0]]
+    found = [b for b in iter(stream.read, None) if isinstance(b, Boxes) and b.features is not None]
+    assert [b.features.tolist() for b in found] == [[[2, 12]], [[3, 13]], [[0, 10]]]  # type: ignore[union-attr]
+    assert [b.pixel[:, 0].tolist() for b in found] == [[20], [30], [0]]
 
 
 def test_the_rig_file_names_the_file_of_features(tmp_path: Path) -> None:
     sources = tuple(CameraSource(source(tmp_path, np.zeros((4, 2)))) for _ in CAMERAS)
     text = format_rig(Recording(tmp_path / "rig.toml", RIG, sources), tmp_path / "rig.toml")
     assert 'appearance = "looks.npy"' in text
-    assert [of_person.source.appearance for of_person in parse_rig(text, tmp_path / "rig.toml").sources] == [
-        tmp_path / "looks.npy"
-    ] * 4
+    found = [one.source.appearance for one in parse_rig(text, tmp_path / "rig.toml").sources]
+    assert found == [tmp_path / "looks.npy"] * 4
 
 
 @pytest.mark.parametrize(

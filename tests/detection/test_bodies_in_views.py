@@ -1,19 +1,17 @@
 """Bodies in views: the evidence of pixels and boxes, and the scale of blobs."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, likelihoods, looking, people, rig_of, room
 from strategies import numbers
 
-from stseg.arrays import Floats, Singles
+from stseg.arrays import Flags, Floats, Singles
 from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, fill_inside, fill_match, half_square
 from stseg.bodies.outlines import outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
@@ -31,7 +29,6 @@ EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(
 )
 
 
-@settings(deadline=None)
 @given(EDGES, EDGES)
 def test_half_square_by_definition(body: Floats, box: Floats) -> None:
     expected = reference.half_square(body, box, TOLERANCE, WIDTH, HEIGHT)
@@ -46,7 +43,6 @@ def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
     assert late_cost == pytest.approx(16 * early_cost)
 
 
-@settings(deadline=None)
 @given(st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.lists(EDGES, max_size=3), st.integers(0, 99))
 @example(np.array([[0.0, 0.0, 1.0, 2.0], [0.0, 5.0, 1.0, 16.0]]), [np.array([0.0, 0.0, 1.0, 40.0])], 0)  # far too tall
 def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -> None:
@@ -71,7 +67,6 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
     np.testing.assert_array_equal(best, np.where(expected > -30.0, expected, -np.inf))
 
 
-@settings(deadline=None)
 @given(st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.integers(0, 99))
 def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
@@ -110,16 +105,11 @@ def test_an_outline_is_the_silhouette(step: int) -> None:
         assert area[j] == pytest.approx(silhouette.sum(), rel=0.15)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 99), st.sampled_from([1, 3]))
 def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
     chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
-    many = (2, 3)
-    ground, heights, widths = (
-        chance.uniform(-3, 3, (*many, 2)),
-        chance.uniform(1.4, 2, many),
-        chance.uniform(0.8, 1.3, many),
-    )
+    ground, heights = chance.uniform(-3, 3, (2, 3, 2)), chance.uniform(1.4, 2, (2, 3))
+    widths = chance.uniform(0.8, 1.3, (2, 3))
     shape = (-(-96 // step), -(-128 // step))
     values, owner = chance.normal(size=shape).astype(np.float32), chance.integers(-1, 3, shape, np.int16)
     sums, whole = sums_inside(table, ground, heights, widths, step, values, owner, np.arange(2))
@@ -156,7 +146,7 @@ def scales_by_definition(detector: Detector, observations: list[ViewObservation]
     views, lattice = [view for view in detector.views if isinstance(view, PixelView)], detector.pixel_lattice.outlines
     cells = len(detector.lattice_ground.reshape(-1, 2))
     mean = np.zeros((len(views), cells))
-    inside: list[list[np.ndarray]] = []
+    inside: list[Flags] = []
     common = [slice(3 * k * cells + 1, 3 * (k + 1) * cells, 3) for k in range(len(views))]
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
         first, area = lattice.first[common[k]], lattice.area[common[k]]
@@ -167,18 +157,12 @@ def scales_by_definition(detector: Detector, observations: list[ViewObservation]
                 if right > left:
                     inside_cell[cell, first[cell] + row, left:right] = True
         mean[k] = np.where(first < 0, 0.0, (inside_cell * observation.raster).sum((1, 2)) / np.maximum(area, 1e-9))
-        inside.append(list(inside_cell))
+        inside.append(inside_cell)
     config = detector.config
     worth = config.prior_log_odds + config.effective_observations * mean.sum(0) > 0
     certain = np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate)
-    scales = []
-    for k in range(len(views)):
-        explained: Floats = lattice.area[common[k]] * mean[k] / certain
-        of_cells = [cell * value for cell, value in zip(inside[k], explained, strict=True)]
-        scales.append(
-            np.max([*(one for one, is_worth in zip(of_cells, worth, strict=True) if is_worth), 0 * of_cells[0]], axis=0)
-        )
-    return scales
+    explained = [worth * lattice.area[part] * own / certain for part, own in zip(common, mean, strict=True)]
+    return [(own * value[:, None, None]).max(0) for own, value in zip(inside, explained, strict=True)]
 
 
 def scales(detector: Detector, observations: Sequence[ViewObservation | None]) -> Singles:

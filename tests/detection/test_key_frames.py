@@ -1,19 +1,16 @@
 """Frames between key frames: when the predicted tracks alone are the answer, and that they are a good one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scenes import BODY, CONFIG, FEW_HEIGHTS, boxes, expecting, likelihoods, people, room, standing_at, walkers
+from scenes import BODY, CONFIG, FEW_HEIGHTS, evidence_of, expecting, people, room, standing_at, walkers
 
 from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
 from stseg.detection.key_frames import key_frame_interval
-from stseg.geometry import Rig
 from stseg.records.people import Explanation
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.tracking.filter.track_filter import TrackFilter
@@ -30,8 +27,7 @@ def detector(kind: str) -> Detector:
 
 
 def show(kind: str, standing: Floats) -> list[ViewEvidence]:
-    rig: Rig = room()
-    return list(likelihoods(rig.cameras, standing)) if kind == "pixels" else [boxes(c, standing) for c in rig.cameras]
+    return evidence_of(kind, room().cameras, standing)
 
 
 def explained(kind: str, frame: int, standing: Floats, predicted: PredictedTracks) -> Explanation:

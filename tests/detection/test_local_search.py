@@ -1,7 +1,5 @@
 """The search for the best set: exhaustively on small problems, merges and splits, and restarts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
@@ -120,6 +118,10 @@ def detector(*kinds: str) -> Detector:
     return Detector(room(), kinds or ["pixels"] * 4, FEW_HEIGHTS, BODY)
 
 
+def box_detector() -> Detector:
+    return detector(*["boxes"] * 4)
+
+
 def silhouettes(ground: Floats, width: float) -> list[Singles]:
     """Views of the room's cameras of people 1.7 m high at ground (n, 2), so wide relative to the common silhouette."""
     views = []
@@ -133,14 +135,22 @@ def silhouettes(ground: Floats, width: float) -> list[Singles]:
     return views
 
 
+def estimate_of(
+    own_detector: Detector, views: Sequence[ViewEvidence], predicted: PredictedTracks | None, pool: Candidates | None
+) -> MapEstimate:
+    """The best set of a pool, or of the predicted tracks alone."""
+    prior = Prior.of(predicted, own_detector.config, own_detector.body, own_detector.border)
+    evidence, pool = own_detector.evidence(own_detector.observe(views), prior), pool or prior.pool()
+    return MapEstimate.of_search(evidence, pool, np.arange(len(pool)))
+
+
+def pool_at(ground: Floats) -> Candidates:
+    """Candidates of mean size at ground (n, 2)."""
+    return Candidates(ground, np.full(len(ground), 1.7), np.full(len(ground), BODY.width_mean))
+
+
 def members_at(ground: Floats, views: list[Singles]) -> MapEstimate:
-    """An estimate with members of mean size at ground (n, 2)."""
-    own_detector = detector()
-    prior = Prior.of(None, own_detector.config, own_detector.body, own_detector.border)
-    evidence = own_detector.evidence(own_detector.observe(views), prior)
-    pool = Candidates(ground, np.full(len(ground), 1.7), np.full(len(ground), BODY.width_mean))
-    members = np.arange(len(ground))
-    return MapEstimate.of_search(evidence, pool, members).with_members(members)
+    return estimate_of(detector(), views, None, pool_at(ground)).with_members(np.arange(len(ground)))
 
 
 def pair(distance: float) -> Floats:
@@ -198,11 +208,8 @@ def test_a_merge_is_the_better_of_both_sets_by_the_plain_score(width: float, dis
 def test_members_far_apart_and_members_in_boxes_are_left_alone() -> None:
     far = members_at(pair(0.7), silhouettes(pair(0.7), 1.0))
     assert merged(far) is far
-    own_detector = detector(*["boxes"] * 4)
-    views = [boxes(camera, np.column_stack([pair(0.5), [1.7, 1.7]])) for camera in room().cameras]
-    prior = Prior.of(None, own_detector.config, own_detector.body, own_detector.border)
-    evidence = own_detector.evidence(own_detector.observe(views), prior)
-    close_pair = MapEstimate.of_search(evidence, Candidates(pair(0.5), np.full(2, 1.7), np.full(2, 0.42)), np.arange(2))
+    views = [boxes(camera, people(*pair(0.5))) for camera in room().cameras]
+    close_pair = estimate_of(box_detector(), views, None, pool_at(pair(0.5)))
     assert len(close_pair.members) == 2
     assert merged(close_pair) is close_pair
 
@@ -287,11 +294,6 @@ def test_no_two_refined_places_are_within_the_hard_core(seed: int) -> None:
 # Restarts
 
 
-@cache
-def box_detector() -> Detector:
-    return Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
-
-
 def separate_places(rng: np.random.Generator, number: int, least: float) -> Floats:
     standing = list[Floats]()
     while len(standing) < number:
@@ -318,11 +320,7 @@ def box_crowd(seed: int) -> tuple[Floats, list[Boxes], PredictedTracks]:
 
 
 def of_tracks(views: Sequence[Boxes | None], predicted: PredictedTracks) -> MapEstimate:
-    """The best set of the predicted tracks alone."""
-    rig_detector = box_detector()
-    prior = Prior.of(predicted, rig_detector.config, rig_detector.body, rig_detector.border)
-    evidence = rig_detector.evidence(rig_detector.observe(views), prior)
-    return MapEstimate.of_search(evidence, prior.pool(), np.arange(len(predicted)))
+    return estimate_of(box_detector(), views, predicted, None)
 
 
 @pytest.mark.parametrize("seed", [9, 19, 31])
@@ -394,11 +392,8 @@ def test_refined_places_are_those_without_a_cache(seed: int) -> None:
 
 def test_more_candidates_have_the_pixels_of_a_whole_pool() -> None:
     ground = separate_places(np.random.default_rng(3), 5, 0.5)
-    rig_detector = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
-    prior = Prior.of(expecting(*ground[:2]), rig_detector.config, rig_detector.body, rig_detector.border)
-    views = rig_detector.observe(likelihoods(room().cameras, people(*ground)))
-    before = MapEstimate.of_search(rig_detector.evidence(views, prior), prior.pool(), np.arange(2))
-    peaks = lattice_candidates(before, rig_detector.lattice_ground)
+    before = estimate_of(detector(), likelihoods(room().cameras, people(*ground)), expecting(*ground[:2]), None)
+    peaks = lattice_candidates(before, detector().lattice_ground)
     found = before.with_more(peaks.at([0])).with_more(peaks.at([1])).problem
     whole = MapEstimate.of_search(before.evidence, before.pool.joined_with(peaks.at([0, 1])), before.members).problem
     for table, made_whole in zip(found.pixels, whole.pixels, strict=True):

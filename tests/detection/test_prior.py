@@ -1,16 +1,15 @@
 """The prior of a frame: predicted tracks, their assignment, and the cost of births."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from scenes import AREA, corner_cameras, expecting, looking, rig_of
+from scenes import corner_cameras, expecting, looking, rig_of
+from scipy.stats import multivariate_normal, norm
 from strategies import numbers
 
 from stseg.arrays import Floats
@@ -35,7 +34,7 @@ CANDIDATES = st.tuples(PLACES, numbers(1.5, 1.9))
 def population(height: float) -> float:
     """Log density of a height in the population: Gaussian within two spreads, a power law of exponent 4 beyond."""
     deviation = abs(height - BODY.height_mean) / BODY.height_spread
-    peak = reference.normal(0.0, BODY.height_spread**2)
+    peak = norm.logpdf(0.0, scale=BODY.height_spread)
     return peak - (deviation**2 / 2 if deviation < 2 else 2 + 4 * math.log(deviation / 2))
 
 
@@ -45,7 +44,6 @@ def tracks_of(tracks: list[tuple[tuple[float, float], Floats, float, float, floa
     return PredictedTracks(np.array(place), np.array(covariance), sizes, np.array(odds))
 
 
-@settings(deadline=None)
 @given(st.lists(TRACKS, min_size=1, max_size=3), st.lists(CANDIDATES, max_size=3))
 def test_log_ratio_of_a_track_by_hand(
     tracks: list[tuple[tuple[float, float], Floats, float, float, float]],
@@ -60,9 +58,9 @@ def test_log_ratio_of_a_track_by_hand(
     for j, (place, tall) in enumerate(candidates):
         birth = CONFIG.prior_log_odds + anywhere + population(tall)
         for k, (at, covariance, height_k, sd, odds) in enumerate(tracks):
-            shape = reference.normal(tall - height_k, sd**2)
+            shape = norm.logpdf(tall, height_k, sd)
             least = population(tall) - 4.0  # people stoop and sit
-            track = odds + reference.normal_place(np.subtract(place, at), covariance) + max(shape, least)
+            track = odds + multivariate_normal.logpdf(place, at, covariance) + max(shape, least)
             assert log_ratio[j, k] == pytest.approx(track - birth, abs=1e-6)
 
 
@@ -71,9 +69,9 @@ def test_log_density_of_a_place_up_to_a_constant() -> None:
     points = np.array([[0.3, -0.4], [0.5, -0.4], [0.3, 0.2]])
     log_density = expected.place_log_density(np.array([1, 0]), points[[[2, 1, 0], [0, 1, 2]]])
     for k, track in enumerate((1, 0)):
-        by_hand = [reference.normal_place(p - expected.ground[track], expected.covariance[track]) for p in points]
-        at_home = reference.normal_place(np.zeros(2), expected.covariance[track])
-        np.testing.assert_allclose(log_density[k], np.subtract(by_hand, at_home)[[[2, 1, 0], [0, 1, 2]][k]], atol=1e-9)
+        normal = multivariate_normal(expected.ground[track], expected.covariance[track])
+        by_hand = normal.logpdf(points) - normal.logpdf(expected.ground[track])
+        np.testing.assert_allclose(log_density[k], by_hand[[[2, 1, 0], [0, 1, 2]][k]], atol=1e-9)
 
 
 def test_a_wrong_height_never_rules_a_track_out() -> None:
@@ -93,10 +91,6 @@ def test_no_tracks() -> None:
     assert expecting((0, 0)).track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 1)
 
 
-# Assignment of tracks
-
-
-@settings(deadline=None)
 @given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 999))
 def test_tracks_are_assigned_at_the_greatest_sum(people: int, tracks: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -110,7 +104,6 @@ def test_tracks_are_assigned_at_the_greatest_sum(people: int, tracks: int, seed:
     assert total == pytest.approx(sum(gain[pair] for pair in pairs))
     place = {k: a for a, k in pairs}
     assert member_of.tolist() == [*(place.get(k, -1) for k in range(tracks)), 77, 77]
-    assert total == pytest.approx(reference.most_of_pairs(gain))
 
 
 def test_a_track_is_of_one_candidate() -> None:
@@ -123,24 +116,9 @@ def test_a_track_is_of_one_candidate() -> None:
     assert member_of.tolist() == [-1]  # a track that does not help leaves a birth
 
 
-# Where people come in
-
-
 def open_ground(grid: Grid) -> Rig:
     """An area that the corner cameras see whole."""
     return Rig("area", 8.0, grid, tuple(looking(c.name, (*c.centre[:2] * 3, 8.0), focal=150) for c in corner_cameras()))
-
-
-def test_distance_inside_a_rectangle() -> None:
-    grid = Grid((-2.0, 2.0), (-1.0, 1.5), 0.1, 1.8, 2)
-    border = Border.of(open_ground(grid))
-    x, y = grid.ground[..., 0], grid.ground[..., 1]
-    edge = np.minimum(np.minimum(x + 2.0, 2.0 - x), np.minimum(y + 1.0, 1.5 - y))
-    np.testing.assert_allclose(border.distance, edge, atol=1e-9)
-    np.testing.assert_allclose(border.away(grid.ground.reshape(-1, 2)), edge.ravel(), atol=1e-9)
-    outside = np.array([[-2.01, 0.0], [2.01, 0.0], [0.0, -1.01], [0.0, 1.51], [40.0, -40.0]])
-    np.testing.assert_array_equal(border.away(outside), 0.0)
-    assert border.away(np.zeros((0, 2))).shape == (0,)
 
 
 @pytest.mark.parametrize(
@@ -150,7 +128,7 @@ def test_distance_inside_a_rectangle() -> None:
 def test_distance_by_trying_all_cells(polygon: list[tuple[float, float]] | None, cameras: int) -> None:
     """The nearest cell that is outside the area, or that no view sees at the height of a trunk."""
     corners = None if polygon is None else np.array(polygon, float)
-    grid = Grid(AREA, AREA, 0.25, 1.8, 2, corners)
+    grid = Grid((-2.0, 2.0), (-2.0, 2.5), 0.25, 1.8, 2, corners)
     narrow = [looking("a", (-4.0, 0.0, 2.0), size=(60, 96)), looking("b", (0.0, -4.0, 2.0), size=(40, 96))]
     rig = Rig("part", 8.0, grid, tuple(narrow[:cameras]) or open_ground(grid).cameras)
     is_seen = np.zeros(grid.shape[1:], bool)

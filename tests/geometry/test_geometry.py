@@ -1,7 +1,5 @@
 """Cameras, grids and rigs; reduction of images."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2
@@ -35,13 +33,8 @@ HEIGHTS = numbers(0.0, 1.2)
 GROUNDS = st.lists(st.tuples(numbers(-1.2, 1.2), numbers(-1.2, 1.2)), min_size=1, max_size=8).map(np.array)
 
 
-def homogeneous(points: Floats) -> Floats:
-    return np.concatenate([points, np.ones_like(points[..., :1])], -1)
-
-
 def pixels_under(matrix: Floats, points: Floats) -> Floats:
-    image = homogeneous(points) @ matrix.T
-    return np.asarray(image[:, :2] / image[:, 2:])
+    return np.asarray(cv2.perspectiveTransform(points[None], matrix)[0])
 
 
 def in_space(ground: Floats, height: float) -> Floats:
@@ -188,13 +181,11 @@ class TestLens:
     def test_fold_is_where_the_radius_turns_round(self) -> None:
         k1, k2, _, _, k3 = BARREL
         radius = np.linspace(0.0, 2.0, 200_001)
-        bent = radius * (1 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6)
-        turn = radius[np.argmax(np.diff(bent) < 0)]
-        assert LENS.fold == pytest.approx(turn, abs=2e-5)
-        rational = Lens(MATRIX, np.array([*BARREL, 0.3, -0.1, 0.02]))
-        bent = radius * (1 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6)
-        bent /= 1 + 0.3 * radius**2 - 0.1 * radius**4 + 0.02 * radius**6
-        assert rational.fold == pytest.approx(radius[np.argmax(np.diff(bent) < 0)], abs=2e-5)
+        barrel = radius * (1 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6)
+        rational = barrel / (1 + 0.3 * radius**2 - 0.1 * radius**4 + 0.02 * radius**6)
+        for bent, more in ((barrel, ()), (rational, (0.3, -0.1, 0.02))):
+            turn = radius[np.argmax(np.diff(bent) < 0)]
+            assert Lens(MATRIX, np.array([*BARREL, *more])).fold == pytest.approx(turn, abs=2e-5)
         assert Lens(MATRIX, np.array([0.1, 0.2])).fold == np.inf
         assert Lens(MATRIX, np.zeros(0)).fold == np.inf
 
@@ -218,9 +209,8 @@ class TestGrid:
     def test_cells_and_ground_agree(self, grid: Grid) -> None:
         planes, rows, columns = grid.shape
         assert grid.ground.shape == (rows, columns, 2)
-        cell = grid.cell_of(grid.ground)
-        np.testing.assert_allclose(cell[..., 0], np.broadcast_to(np.arange(columns), (rows, columns)), atol=1e-9)
-        np.testing.assert_allclose(cell[..., 1], np.broadcast_to(np.arange(rows)[:, None], (rows, columns)), atol=1e-9)
+        cell = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1)
+        np.testing.assert_allclose(grid.cell_of(grid.ground), cell, atol=1e-9)
         assert len(grid.heights) == planes
         assert grid.inside().shape == (rows, columns)
 

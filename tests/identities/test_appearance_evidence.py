@@ -1,10 +1,8 @@
 """Appearance as evidence of identity: learned where people differ, nothing where they do not, cameras' gains undone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from simulated_people import BORDER, CONFIG, RATE, Path, rows_of, straight, swapped, visit
+from simulated_people import BORDER, CONFIG, RATE, Path, committed, rows_of, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.association import IdentityProblem, associate_globally
@@ -19,14 +17,7 @@ FRAMES = range(160)
 
 def walkers() -> Rows:
     """People who walk beside each other, two metres apart."""
-    return raw(rows_of({k: (straight(-5, 2 * k - 7, 0.5, 0), 1.7, FRAMES) for k in range(1, PEOPLE + 1)}))
-
-
-def raw(rows: Rows) -> Rows:
-    told = rows.copy()
-    told["raw_x"], told["raw_y"] = rows["x"], rows["y"]
-    told["xx"] = told["yy"] = 0.02
-    return told
+    return committed(rows_of({k: (straight(-5, 2 * k - 7, 0.5, 0), 1.7, FRAMES) for k in range(1, PEOPLE + 1)}))
 
 
 def appearance(rows: Rows, true: Ints, noise: float, differ: float, seed: int, name: str = "features") -> Rows:
@@ -110,20 +101,21 @@ def test_offsets_of_cameras_are_undone() -> None:
         assert distance(found.value, (rows["id"] == k) & early, (rows["id"] == k) & late) < 0.5
 
 
+def associated(rows: Rows, looks: Rows) -> Ints:
+    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
+    return associate_globally(rows, IdentityProblem.of(rows, sizes, looks, RATE, BORDER, CONFIG)).identity
+
+
 def test_features_tell_two_apart_who_are_equally_tall() -> None:
     """Two stand together and are swapped by the filter; four others walk by, from whom features are learned."""
     others = {k: (straight(-5, k - 1, 0.5, 0), 1.7, FRAMES) for k in range(3, 6)}
-    true = raw(rows_of({1: (visit(-1), 1.70, FRAMES), 2: (visit(1), 1.70, FRAMES)} | others, noise=0.0))
-    for late in (False, True):
-        told = true.copy()
-        if late:
-            pair = true["id"] <= 2
-            told[pair] = swapped(true[pair], 80)
-        looks = appearance(told, true["id"], 1.0, 1.0, 4)
-        sizes = MeasuredSizes.of_heights(told["height"], CONFIG)
-        found = associate_globally(told, IdentityProblem.of(told, sizes, looks, RATE, BORDER, CONFIG))
-        apart = ~np.isin(told["frame"], range(72, 89))
-        np.testing.assert_array_equal(found.identity[apart], true["id"][apart])
+    true = committed(rows_of({1: (visit(-1), 1.70, FRAMES), 2: (visit(1), 1.70, FRAMES)} | others, noise=0.0))
+    exchanged, pair = true.copy(), true["id"] <= 2
+    exchanged[pair] = swapped(true[pair], 80)
+    for rows in (true, exchanged):
+        found = associated(rows, appearance(rows, true["id"], 1.0, 1.0, 4))
+        apart = ~np.isin(rows["frame"], range(72, 89))
+        np.testing.assert_array_equal(found[apart], true["id"][apart])
 
 
 def dance(side: float, y: float) -> Path:
@@ -134,17 +126,15 @@ def dance(side: float, y: float) -> Path:
 def test_appearance_is_learned_from_mostly_wrong_identities() -> None:
     """Pairs of equally tall people, who are exchanged or not each time they stand together."""
     paths = {2 * k + side: (dance(2 * side - 1, 3.0 * k), 1.7, FRAMES) for k in range(3) for side in (0, 1)}
-    rows = raw(rows_of({track + 1: path for track, path in paths.items()}))
+    rows = committed(rows_of({track + 1: path for track, path in paths.items()}))
     rng = np.random.default_rng(2)
     crossed = np.cumsum(rng.random((3, 6)) < 0.5, axis=1) % 2
     index = rows["id"] - 1
     meeting = (rows["frame"] / RATE / 4).astype(int)
     true = 1 + index // 2 * 2 + (index % 2 + crossed[index // 2, meeting]) % 2
-    looks = appearance(rows, true, 1.0, 1.0, 4)
-    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    found = associate_globally(rows, IdentityProblem.of(rows, sizes, looks, RATE, BORDER, CONFIG))
+    found = associated(rows, appearance(rows, true, 1.0, 1.0, 4))
     apart = np.abs(rows["x"]) > 0.6
-    pairs, count = np.unique(np.stack([found.identity[apart], true[apart]]), axis=1, return_counts=True)
+    pairs, count = np.unique(np.stack([found[apart], true[apart]]), axis=1, return_counts=True)
     assert pairs.shape[1] == 6, (pairs, count)
 
 

@@ -1,14 +1,12 @@
 """Who is who from the whole run: meetings undone by height and motion, people found again, and the greatest sum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
+from simulated_people import BORDER, CONFIG, RATE, Path, gone, rows_of, runs, straight, swapped, visit
 
-from stseg.arrays import Ints, Rows
+from stseg.arrays import Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally
 from stseg.identities.evidence.size_model import MeasuredSizes
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
@@ -20,52 +18,40 @@ def relinked(rows: Rows) -> GlobalAssociation:
     return associate_globally(rows, IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG))
 
 
-def names(rows: Rows, identity: Ints, track: int, frames: range) -> set[int]:
-    """Identities of a track in some frames."""
-    return set(identity[(rows["id"] == track) & np.isin(rows["frame"], frames)].tolist())
-
-
 MET = range(72, 89)
 """Frames in which two visitors stand together."""
-
-
-# Meetings
 
 
 @pytest.mark.parametrize(("frame", "taller"), [(80, 0.08), (78, 0.15), (80, 0.15), (82, 0.15)])
 def test_heights_resolve_a_swap_of_two_who_stood_together(frame: int, taller: float) -> None:
     true = rows_of({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70 + taller, range(160))}, noise=0.0)
-    told = swapped(true, frame)
-    found = relinked(told)
+    found = relinked(swapped(true, frame))
     apart = ~np.isin(true["frame"], MET)
     np.testing.assert_array_equal(found.identity[apart], true["id"][apart])
     assert sorted(link.identity for link in found.links) == [1, 2]
     assert all(link.frame in MET and link.track == 3 - link.identity for link in found.links)
 
 
-def test_who_was_followed_rightly_through_a_meeting_stays() -> None:
-    for taller in (0.0, 0.08):
-        rows = rows_of({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70 + taller, range(160))})
-        found = relinked(rows)
-        np.testing.assert_array_equal(found.identity, rows["id"])
-        assert not found.links
+PASSING = {1: (straight(-4, -0.15, 1, 0), 1.7, range(64)), 2: (straight(4, 0.15, -1, 0), 1.7, range(64))}
 
 
-def test_who_walk_straight_past_each_other_keep_their_tracks() -> None:
-    """The same height: motion tells, and the track that was followed."""
-    rows = rows_of(
-        {
-            1: (lambda t: (-4 + t, -0.15), 1.7, range(64)),
-            2: (lambda t: (4 - t, 0.15), 1.7, range(64)),
-        }
-    )
-    assert len(isolated_tracklets(rows, RATE)) == 4
+@pytest.mark.parametrize(
+    ("people", "tracklets"),
+    [
+        ({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70, range(160))}, 4),
+        ({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.78, range(160))}, 4),
+        (PASSING, 4),
+        ({1: (straight(2.9, 0, 1, 0), 1.65, range(24)), 2: (straight(9.5, 0.2, -0.9, 0), 1.82, range(32, 56))}, 2),
+        ({1: (straight(-3, 0.5, 0.7, 0), 1.7, range(24)), 2: (straight(-3, 0.5, 0.7, 0), 1.95, range(32, 56))}, 2),
+    ],
+    ids=["together", "together, of two heights", "past each other", "out and in at the border", "another height"],
+)
+def test_tracks_that_were_right_stay(people: dict[int, tuple[Path, float, range]], tracklets: int) -> None:
+    rows = rows_of(people)
+    assert len(isolated_tracklets(rows, RATE)) == tracklets
     found = relinked(rows)
     np.testing.assert_array_equal(found.identity, rows["id"])
     assert not found.links
-
-
-# Out of sight
 
 
 def test_somebody_lost_inside_the_area_is_the_same_afterwards() -> None:
@@ -84,27 +70,7 @@ def test_too_long_is_somebody_else() -> None:
     np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
 
 
-def test_another_height_is_somebody_else() -> None:
-    rows = gone(1.0, tall=1.95)
-    np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
-
-
-def test_one_leaves_at_the_border_and_another_comes_in() -> None:
-    rows = rows_of(
-        {
-            1: (lambda t: (2.9 + t, 0.0), 1.65, range(24)),
-            2: (lambda t: (5.9 - 0.9 * (t - 4), 0.2), 1.82, range(32, 56)),
-        }
-    )
-    found = relinked(rows)
-    np.testing.assert_array_equal(found.identity, rows["id"])
-    assert not found.links
-
-
-# Any run
-
-
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(runs(6))
 def test_nobody_is_in_two_places_at_once(rows: Rows) -> None:
     found = relinked(rows)
@@ -117,7 +83,7 @@ def test_nobody_is_in_two_places_at_once(rows: Rows) -> None:
         assert (rows["frame"][found.identity == link.identity] < link.frame).any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(runs(5), st.integers(0, 999))
 def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(len(rows))
@@ -132,17 +98,8 @@ def test_nobody_at_all() -> None:
     assert len(found.identity) == len(found.links) == 0
 
 
-# Tracklets
-
-
 def test_a_track_is_cut_at_encounters_and_gaps() -> None:
-    rows = rows_of(
-        {
-            1: (lambda t: (-4 + t, -0.1), 1.7, range(64)),
-            2: (lambda t: (4 - t, 0.1), 1.8, range(64)),
-        },
-        noise=0.0,
-    )
+    rows = rows_of(PASSING, noise=0.0)
     rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
     parts = sorted(
         (int(rows["id"][part[0]]), *rows["frame"][part[[0, -1]]].tolist()) for part in isolated_tracklets(rows, RATE)

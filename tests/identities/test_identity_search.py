@@ -1,7 +1,5 @@
 """The search of identities, and answers as its hard constraints."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,7 +44,7 @@ def found(seen: Observations, lag: float = 60.0, hypotheses: int = 400) -> Ints:
     return search_identities(seen, MODEL, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag)).name
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(runs(2))
 def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
     with pytest.MonkeyPatch.context() as patch:
@@ -222,7 +220,7 @@ def test_who_was_away_for_long_is_the_same_if_somebody_says_so() -> None:
     assert len(set(identities(near, Constraints.of([], pair)).tolist())) == 2
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(runs(4), st.data())
 def test_whatever_can_be_true_is_obeyed(rows: Rows, data: st.DataObject) -> None:
     """Constraints of any naming in which nobody is twice in a frame."""
@@ -253,13 +251,9 @@ def test_constraints_of_nobody_change_nothing() -> None:
 def bound(rows: Rows, *answers: Answer) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
     """Track and frame of both rows of what is the same, and of what is not."""
     found = answered_rows(rows, answers, RATE).constraints
-    told = [
-        (*(int(rows[name][a]) for name in ("id", "frame")), *(int(rows[name][b]) for name in ("id", "frame")))
-        for a, b in zip(found.earlier, found.later, strict=True)
-    ]
-    return [one for one, same in zip(told, found.same, strict=True) if same], [
-        one for one, same in zip(told, found.same, strict=True) if not same
-    ]
+    parts = [rows[row][name].tolist() for row in (found.earlier, found.later) for name in ("id", "frame")]
+    pairs = list(zip(zip(*parts, strict=True), found.same, strict=True))
+    return [pair for pair, same in pairs if same], [pair for pair, same in pairs if not same]
 
 
 def test_answers_bind_rows_where_people_stand_apart() -> None:

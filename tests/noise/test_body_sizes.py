@@ -1,18 +1,16 @@
 """Heights and widths: the E step by its definition, and what it finds of people in named scenes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, expecting, likelihoods, people, room
+from scenes import BODY, FEW_HEIGHTS, corner_cameras, evidence_of, expecting, likelihoods, people, room
 from scipy.special import expit
 from strategies import numbers
 
-from stseg.arrays import Boxes, Flags, Floats, Singles
+from stseg.arrays import Flags, Floats, Singles
 from stseg.bodies.outlines import outlines
 from stseg.bodies.pillars import SILHOUETTE, WIDTH
 from stseg.bodies.views import BACKGROUND_WEIGHT, BODY_WEIGHT, PixelView
@@ -22,7 +20,6 @@ from stseg.detection.search.refine import EvidenceAssignment, RefinedPlaces
 from stseg.records.candidates import Candidates
 from stseg.records.sizes import Sizes
 
-"""The lattice, in standard deviations."""
 VALUES = st.tuples(numbers(1.4, 2.0), numbers(0.01, 0.2), numbers(1.4, 2.0), numbers(0.03, 0.3))
 
 
@@ -31,9 +28,9 @@ def sizes_of(mean: float, spread: float) -> Sizes:
     return Sizes(mean * one, spread**2 * one, mean / 4 * one, spread**2 * one)
 
 
-def pixel_view(few: int = 0) -> PixelView:
+def pixel_view(view: int = 0) -> PixelView:
     rig = room()
-    return PixelView(rig.cameras[few], rig.grid, np.zeros((1, 2)), FEW_HEIGHTS, BODY)
+    return PixelView(rig.cameras[view], rig.grid, np.zeros((1, 2)), FEW_HEIGHTS, BODY)
 
 
 def at(ground: Floats) -> RefinedPlaces:
@@ -54,9 +51,6 @@ def everything(view: PixelView) -> EvidenceAssignment:
     return open_to_one(np.ones(view.shape, bool))
 
 
-# Means and variances
-
-
 @given(VALUES)
 def test_the_priors_variance_can_be_taken_out_again(values: tuple[float, float, float, float]) -> None:
     measured, prior = sizes_of(*values[:2]), sizes_of(*values[2:])
@@ -71,9 +65,6 @@ def test_what_says_nothing_leaves_the_prior() -> None:
     after = prior.as_measurements(prior).with_prior(other)
     np.testing.assert_allclose([after.height, after.width], [other.height, other.width], atol=1e-5)
     np.testing.assert_allclose(after.height_variance, other.height_variance, rtol=1e-4)
-
-
-# The E step
 
 
 def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Candidates) -> Floats:
@@ -127,25 +118,19 @@ def test_who_is_hidden_is_like_anybody() -> None:
 
 def test_wider_people_are_found_wider() -> None:
     """Silhouettes of a body of the profile's width, and of one a fifth slimmer."""
-    rig, found = room(), []
+    views, found, place = [pixel_view(k) for k in range(4)], [], np.zeros((1, 2))
+    own = open_to_one(*(np.ones(view.shape, bool) for view in views))
     for wide in (0.8, 1.0):
-        views = [PixelView(camera, rig.grid, np.zeros((1, 2)), FEW_HEIGHTS, BODY) for camera in rig.cameras]
-        sights = []
+        observations = []
         for view in views:
-            seen = np.zeros(view.camera.size[::-1], np.float32)
-            first, spans, _ = outlines(
-                view.table, np.zeros((1, 2)), np.array([1.75]), 1, seen.shape[:2], np.array([wide])
-            )
+            image = np.zeros(view.camera.size[::-1], np.float32)
+            first, spans, _ = outlines(view.table, place, np.array([1.75]), 1, image.shape[:2], np.array([wide]))
             for k, (start, stop) in enumerate(spans[0]):
-                seen[first[0] + k, start:stop] = 1.0
-            sights.append(view.observe(seen))
-        own = open_to_one(*(np.ones(view.shape, bool) for view in views))
-        found.append(float(body_sizes(at(np.zeros((1, 2))), np.array([0.42]), views, sights, own, BODY).width[0]))
+                image[first[0] + k, start:stop] = 1.0
+            observations.append(view.observe(image))
+        found.append(float(body_sizes(at(place), np.array([0.42]), views, observations, own, BODY).width[0]))
     assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04
     assert found[1] == pytest.approx(WIDTH, abs=0.04)
-
-
-# The body
 
 
 def test_the_head_closes() -> None:
@@ -157,17 +142,10 @@ def test_the_head_closes() -> None:
     assert SILHOUETTE[-1, 1] < 0.05
 
 
-# People in rooms
-
-
 def tall_and_short(kind: str) -> tuple[Floats, Sizes]:
     standing = people((-0.9, 0.4, 1.58), (0.6, -0.5, 1.86), (0.9, 0.9, 1.7))
-    rig = room()
-    frame_pass = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY)
-    seen: list[Singles] | list[Boxes] = (
-        likelihoods(rig.cameras, standing) if kind == "pixels" else [boxes(camera, standing) for camera in rig.cameras]
-    )
-    found = frame_pass.explain(seen, None).people
+    frame_pass = Detector(room(), [kind] * 4, FEW_HEIGHTS, BODY)
+    found = frame_pass.explain(evidence_of(kind, room().cameras, standing), None).people
     order = [int(np.hypot(*(found.ground - place[:2]).T).argmin()) for place in standing]
     assert sorted(order) == [0, 1, 2]
     return standing, found.sizes.at(order)
@@ -194,7 +172,7 @@ def test_who_is_known_keeps_their_height() -> None:
     assert known.sizes.height[0] == pytest.approx(stranger.sizes.height[0], abs=0.03)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(numbers(1.45, 1.95))
 def test_taller_people_are_found_taller(height: float) -> None:
     view = pixel_view()

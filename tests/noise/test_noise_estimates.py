@@ -1,7 +1,5 @@
 """Estimates of a run: noise of boxes, the population of bodies, and rims of silhouettes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, expecting, found, likelihoods, people, rig_of, room
 from scipy.ndimage import maximum_filter
@@ -50,7 +48,6 @@ def test_tolerance_of_boxes_follows_their_score() -> None:
     np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(0, 1), max_size=5))
 def test_what_is_sharper_says_more(scores: list[float]) -> None:
     score = np.array(scores)
@@ -73,25 +70,24 @@ def test_noise_begins_at_the_prior_and_forgets() -> None:
 
 def taught(sharpening: BoxNoiseEstimate, spread: float, score: float, frames: int) -> None:
     """Boxes of three people in four views, edges off by so much of the height; every fourth ends far above the feet."""
-    rng, rig = np.random.default_rng(3), rig_of(corner_cameras())
-    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS, BODY)
-    standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7), (0.6, 0.8, 1.7))
+    rng, frame_pass = np.random.default_rng(3), Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
     for _ in range(frames):
-        seen = [shaken(view.table.boxes_of(*standing_of(standing)), spread, score, rng) for view in frame_pass.views]
-        explained = frame_pass.explain(seen, None)
-        sharpening.learn(explained, frame_pass.views, frame_pass.observe(seen))
+        seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6), (0.6, 0.8)), spread, score, rng)
+        sharpening.learn(frame_pass.explain(seen, None), frame_pass.views, frame_pass.observe(seen))
 
 
-def standing_of(standing: Floats) -> tuple[Floats, Floats]:
-    return standing[:, :2], standing[:, 2]
-
-
-def shaken(bodies: Floats, spread: float, score: float, rng: np.random.Generator) -> Boxes:
-    tall = bodies[:, 3] - bodies[:, 1] + EDGE_GRAIN[: LOWER_EDGE_BELOW + 1, None]
-    middle, wide, head, foot = rng.normal(0, spread, (4, len(bodies))) * tall
-    left, right = bodies[:, 0] + middle - wide / 2, bodies[:, 2] + middle + wide / 2
-    top, bottom = bodies[:, 1] + head, bodies[:, 3] + foot
-    return Boxes(np.column_stack([left, top, right - left, bottom - top]), np.full(len(bodies), score))
+def shaken_boxes(
+    detector: Detector, standing: Floats, spread: float, score: float, rng: np.random.Generator
+) -> list[Boxes]:
+    found = []
+    for view in detector.views:
+        bodies = view.table.boxes_of(standing[:, :2], standing[:, 2])
+        tall = bodies[:, 3] - bodies[:, 1] + EDGE_GRAIN[: LOWER_EDGE_BELOW + 1, None]
+        middle, wide, head, foot = rng.normal(0, spread, (4, len(bodies))) * tall
+        left, right = bodies[:, 0] + middle - wide / 2, bodies[:, 2] + middle + wide / 2
+        top, bottom = bodies[:, 1] + head, bodies[:, 3] + foot
+        found.append(Boxes(np.column_stack([left, top, right - left, bottom - top]), np.full(len(bodies), score)))
+    return found
 
 
 @pytest.mark.parametrize("spread", [0.015, 0.04])
@@ -148,11 +144,8 @@ def test_a_boxs_distance_is_measured_by_its_own_tolerance() -> None:
 
 
 def test_each_session_begins_with_the_first_guess() -> None:
-    rig = rig_of(corner_cameras())
-    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS, BODY)
-    standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7))
-    rng = np.random.default_rng(0)
-    seen = [shaken(view.table.boxes_of(*standing_of(standing)), 0.02, 1.0, rng) for view in frame_pass.views]
+    frame_pass = Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
+    seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6)), 0.02, 1.0, np.random.default_rng(0))
     learned = frame_pass.new_estimates()
     frame_pass.explain_next(learned, 0, seen, None)
     assert (learned.box_noise.offsets.sums[:, 0] > 0).any()
@@ -170,8 +163,7 @@ def sized(heights: list[float], widths: list[float], unresolved: float = 0.0, ev
     """People whose sizes a frame left open by a share of the default population's variance."""
     n, body = len(heights), BodyConfig()
     seen = found(people(*[(0.1 * k, 0.0) for k in range(n)]), evidence=evidence)
-    variances = (np.full(n, unresolved * spread**2) for spread in (body.height_spread, body.width_spread))
-    tall, wide = variances
+    tall, wide = (np.full(n, unresolved * spread**2) for spread in (body.height_spread, body.width_spread))
     return replace(seen, sizes=replace(seen.sizes, height=np.array(heights), height_variance=tall,
                                        width=np.array(widths), width_variance=wide))  # fmt: skip
 
@@ -200,10 +192,8 @@ def test_means_and_spreads_by_the_formulas() -> None:
 def test_nothing_seen_teaches_nothing() -> None:
     for frame in (sized([], []), sized([1.0], [0.2], unresolved=1.0), sized([1.0], [0.2], evidence=1.0)):
         after = learned_body([frame] * 20)
-        np.testing.assert_allclose(
-            [after.height_mean, after.height_spread, after.width_mean, after.width_spread],
-            [1.7, 0.12, 0.42, 0.04],
-        )
+        found = [after.height_mean, after.height_spread, after.width_mean, after.width_spread]
+        np.testing.assert_allclose(found, [1.7, 0.12, 0.42, 0.04])
 
 
 def test_people_alike_leave_the_least_spread_and_are_forgotten() -> None:
@@ -276,7 +266,7 @@ def test_the_configuration_precedes_the_rig_as_a_prior() -> None:
 # Rims
 
 
-APART = ((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75))
+APART = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75))
 
 
 def shown(raster: Singles) -> ViewObservation:
@@ -290,16 +280,12 @@ def seen(standing: Floats, eaten: int) -> list[ViewEvidence]:
     return [np.asarray(cv2.erode(view, disc), np.float32) for view in likelihoods(room().cameras, standing)]
 
 
-def learned_rims(standing: Floats, eaten: int, frames: int = 10, evidence: float = 20.0) -> RimEstimate:
-    return learned_from(seen(standing, eaten), standing, frames, evidence)
-
-
-def learned_from(
-    evidence_of_views: Sequence[ViewEvidence], standing: Floats, frames: int = 10, evidence: float = 20.0
+def learned_rims(
+    standing: Floats, views: Sequence[ViewEvidence], frames: int = 10, evidence: float = 20.0
 ) -> RimEstimate:
     asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
     rims, here = asked.new_estimates().rims, replace(found(standing, evidence=evidence), height=standing[:, 2])
-    observations = asked.observe(evidence_of_views)
+    observations = asked.observe(views)
     for _ in range(frames):
         rims.learn(here, asked.views, observations)
     return rims
@@ -314,21 +300,20 @@ def test_background_beside_foreground_says_less() -> None:
 
 
 def test_nothing_is_withdrawn_from_whole_silhouettes() -> None:
-    rims, raster = learned_rims(people(*APART), 0), np.full((3, 3), -1.0, np.float32)
+    rims, whole = learned_rims(APART, seen(APART, 0)), shown(np.full((3, 3), -1.0, np.float32))
     assert rims.shares.sums[:, 0].min() > 1.0
     np.testing.assert_array_equal(rims.withdrawn, 0.0)
-    whole = shown(raster)
     assert without_rim(whole, 0.0) is whole
 
 
 def test_eaten_silhouettes_lose_their_rim() -> None:
-    weak, strong = (learned_rims(people(*APART), eaten).withdrawn for eaten in (1, 3))
+    weak, strong = (learned_rims(APART, seen(APART, eaten)).withdrawn for eaten in (1, 3))
     assert (strong > 0.8).all()
     assert (weak < strong).all()
 
 
 def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
-    rims = learned_rims(people(*APART), 2, frames=200)
+    rims = learned_rims(APART, seen(APART, 2), frames=200)
     weight, missing, rim = rims.shares.sums.T
     left = (missing - rims.withdrawn * rim) / weight
     np.testing.assert_allclose(left[rims.withdrawn < 1], FEW_HEIGHTS.pixel_miss_rate, atol=0.01)
@@ -337,17 +322,15 @@ def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
 
 def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
     alone = people((0.0, 0.0, 1.7))
-    eaten: list[ViewEvidence] = []
-    shifted: list[ViewEvidence] = []
-    for view in likelihoods(room().cameras, alone):
-        beside = np.roll(view, 2, axis=1)
-        shifted.append(beside)
-        eaten.append(np.minimum(view, beside))
-    assert (learned_from(eaten, alone).shares.sums[:, 1] > 1.5 * learned_from(shifted, alone).shares.sums[:, 1]).all()
+    views = likelihoods(room().cameras, alone)
+    shifted = [np.roll(view, 2, axis=1) for view in views]
+    eaten = [np.minimum(view, beside) for view, beside in zip(views, shifted, strict=True)]
+    lost, beside = (learned_rims(alone, evidence).shares.sums[:, 1] for evidence in (eaten, shifted))
+    assert (lost > 1.5 * beside).all()
 
 
 def test_a_view_without_people_takes_the_mean_of_the_others() -> None:
-    rims = learned_rims(people(*APART), 3)
+    rims = learned_rims(APART, seen(APART, 3))
     every = rims.withdrawn
     rims.shares.sums[2] = 0.0
     assert rims.withdrawn[2] == pytest.approx(np.delete(every, 2).mean(), abs=0.1)
@@ -355,17 +338,17 @@ def test_a_view_without_people_takes_the_mean_of_the_others() -> None:
 
 
 @pytest.mark.parametrize(
-    ("standing", "evidence"), [([(0.0, 0.0, 1.7), (0.1, 0.1, 1.7)], 20.0), (list(APART), 1.0), ([], 20.0)]
+    ("standing", "evidence"), [(people((0.0, 0.0), (0.1, 0.1)), 20.0), (APART, 1.0), (people(), 20.0)]
 )
-def test_who_overlaps_or_is_doubted_teaches_nothing(standing: list[tuple[float, ...]], evidence: float) -> None:
-    np.testing.assert_array_equal(learned_rims(people(*standing), 3, evidence=evidence).shares.sums, 0.0)
+def test_who_overlaps_or_is_doubted_teaches_nothing(standing: Floats, evidence: float) -> None:
+    np.testing.assert_array_equal(learned_rims(standing, seen(standing, 3), evidence=evidence).shares.sums, 0.0)
 
 
 def test_learned_rims_raise_evidence_in_eaten_silhouettes() -> None:
     standing = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
     asked, evidence = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY), []
     first = asked.new_estimates()
-    for known in (first, replace(first, rims=learned_rims(people(*APART), 1))):
+    for known in (first, replace(first, rims=learned_rims(APART, seen(APART, 1)))):
         explained = asked.explain_next(known, 0, seen(standing, 1), expecting(*standing))
         assert len(explained.people) == len(standing)
         evidence.append(explained.people.evidence.sum())

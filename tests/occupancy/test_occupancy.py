@@ -1,19 +1,30 @@
 """The volume of a frame: clutter, sampling, likelihood per plane and fusion by definition, and what they mean."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, found, likelihoods, looking, no_boxes, people, rig_of, room
+from scenes import (
+    BODY,
+    FEW_HEIGHTS,
+    boxes,
+    corner_cameras,
+    evidence_of,
+    found,
+    likelihoods,
+    looking,
+    no_boxes,
+    people,
+    rig_of,
+    room,
+)
 from strategies import numbers, rigs
 
-from stseg.arrays import Boxes, Floats, Ints, Singles, ViewEvidence
+from stseg.arrays import Boxes, Floats, Ints, Singles
 from stseg.bodies.box_fit import TOLERANCE
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable
@@ -38,14 +49,12 @@ RATES = ErrorRates(FEW_HEIGHTS.pixel_miss_rate, FEW_HEIGHTS.pixel_clutter_rate, 
 
 def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, step: int = 1) -> Explanation:
     """An explanation in which these pixels are whose; nobody's where it is not said."""
-    views, nobody = len(rig.cameras), found(people(), views=len(rig.cameras))
-    width, height = rig.cameras[0].size
+    views, (width, height) = len(rig.cameras), rig.cameras[0].size
     blank = np.full((-(-height // step), -(-width // step)), -1, np.int16)
-    owners = [blank] * views if owner is None else [np.asarray(o, np.int16) for o in owner]
-    free = tuple(np.zeros(0, np.int64) for _ in range(views))
-    return Explanation(
-        found(standing, views=views), nobody, tuple(owners), (step,) * views, free, np.full(views, np.nan)
-    )
+    owners = (blank,) * views if owner is None else tuple(np.asarray(o, np.int16) for o in owner)
+    free = (np.zeros(0, np.int64),) * views
+    somebody, nobody = found(standing, views=views), found(people(), views=views)
+    return Explanation(somebody, nobody, owners, (step,) * views, free, np.full(views, np.nan))
 
 
 def flat(value: float) -> Singles:
@@ -62,7 +71,6 @@ def noise(seed: int) -> list[Singles]:
 # Clutter
 
 
-@settings(deadline=None)
 @given(st.integers(1, 20), st.integers(1, 20), st.integers(1, 25), st.integers(0, 99))
 def test_clutter_by_definition(height: int, width: int, side: int, seed: int) -> None:
     likelihood = np.random.default_rng(seed).random((height, width)).astype(np.float32)
@@ -80,22 +88,16 @@ def test_clutter_measures_unrest_within_cells() -> None:
     assert clutter(halves, 48) > 0.2
 
 
-@given(st.lists(st.none() | numbers(0, 0.5), min_size=1, max_size=6))
-def test_weights_fall_with_clutter_down_to_the_median(clutters: list[float | None]) -> None:
-    given_clutter = np.array([np.nan if c is None else c for c in clutters])
-    weights = clutter_weights(given_clutter)
-    awake = ~np.isnan(given_clutter)
+@given(st.lists(st.just(np.nan) | numbers(0, 0.5), max_size=6), numbers(0, 0.5))
+@example([0.1, 0.1, 0.1], 0.0)  # a view that sees nothing does not silence the others
+def test_weights_fall_with_clutter_down_to_the_median(others: list[float], clutter: float) -> None:
+    clutters = np.array([*others, clutter])
+    weights, awake = clutter_weights(clutters), ~np.isnan(clutters)
     assert (weights[~awake] == 0).all()
-    if awake.any():
-        assert weights[awake].mean() == pytest.approx(1.0)
-        floor = max(float(np.median(given_clutter[awake])), 1e-6)
-        share = weights[awake] * np.maximum(given_clutter[awake], floor)
-        np.testing.assert_allclose(share, share[0])
-
-
-def test_a_view_that_sees_nothing_does_not_silence_the_others() -> None:
-    weights = clutter_weights(np.array([0.0, 0.1, 0.1, 0.1]))
-    np.testing.assert_allclose(weights, 1.0)
+    assert weights[awake].mean() == pytest.approx(1.0)
+    floor = max(float(np.median(clutters[awake])), 1e-6)
+    share = weights[awake] * np.maximum(clutters[awake], floor)
+    np.testing.assert_allclose(share, share[0])
     assert clutter_weights(np.array([np.nan, np.nan])).tolist() == [0.0, 0.0]
 
 
@@ -105,7 +107,7 @@ def test_a_view_that_sees_nothing_does_not_silence_the_others() -> None:
 KINDS: list[SamplingKind] = ["point", "footprint"]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(rigs(most=2), st.sampled_from(KINDS))
 def test_cells_are_looked_up_where_they_project(rig: Rig, kind: SamplingKind) -> None:
     sampling = Sampling.of(rig, kind)
@@ -160,7 +162,7 @@ def test_cells_outside_the_polygon_are_not_seen() -> None:
 # Likelihood per plane
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 999))
 def test_likelihood_per_plane_by_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -194,16 +196,9 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near_person[y, x])]
         clutter_rate = rates.clutter if near_person[y, x] < 0 else rates.near_clutter
         for z, plane in enumerate(grid.heights):
-            best = reference.plane_likelihood(
-                bodies[:, y, x].astype(np.float32),
-                tried,
-                plane,
-                float(height[near_person[y, x] + 1]),
-                0.1,
-                shaken,
-                free,
-                camera.size,
-            )
+            tall = float(height[near_person[y, x] + 1])
+            pillars_here = np.asarray(bodies[:, y, x].astype(np.float32), float)
+            best = reference.plane_likelihood(pillars_here, tried, plane, tall, 0.1, shaken, free, camera.size)
             expected = TOP_LEVEL * plane_likelihood(best, rates.miss, clutter_rate) if (z, cell) != (2, 5) else UNSEEN
             assert levels[z, cell] == pytest.approx(expected, abs=0.6)
 
@@ -286,7 +281,7 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
     """With every block marked, no cell has a representative; rates are the same up to the order of sums."""
     rig = rig_of(corner_cameras(), cell=0.1, planes=3)
     standing = people((-1.6, 0.3), (1.4, -1.6))
-    seen: list[ViewEvidence] = [boxes(one, standing) for one in rig.cameras]
+    seen = evidence_of(kind, rig.cameras, standing)
     if kind == "pixels":
         seen = [view * (view > 0.5) for view in likelihoods(rig.cameras, standing)]
     explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
@@ -305,17 +300,13 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
 @pytest.mark.parametrize("value", [0.0, 0.3, 1.0])
 def test_more_views_are_sharper_evidence(value: float) -> None:
     """With equal weights u is the plain sum of the views' log-odds and the prior."""
-    rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=200.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
-    fused = (
-        Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS, BODY).fuse([flat(value)] * 3, explained(rig, people())).dense()
-    )
-    miss, false, _ = RATES
-    one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
+    rig = rig_of([looking(f"cam{x}{y}", (x, y, 2.6), focal=200.0) for x, y in ((-3, -3), (3, -3), (3, 3))])
+    occupancy = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS, BODY)
+    fused = occupancy.fuse([flat(value)] * 3, explained(rig, people())).dense()
     views = Sampling.of(rig, "point").views()
     assert set(np.unique(views).tolist()) >= {0, 1, 2, 3}
-    np.testing.assert_allclose(
-        fused[views > 0], CONFIG.effective_observations * views[views > 0] * one + PRIOR, atol=LEVEL
-    )
+    sharper = CONFIG.effective_observations * reference.log_odds_term(value, RATES)
+    np.testing.assert_allclose(fused[views > 0], sharper * views[views > 0] + PRIOR, atol=LEVEL)
     assert np.isnan(fused[views == 0]).all()
 
 
@@ -373,9 +364,7 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
 def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     rig = room()
     standing = people((-0.8, 0.3), (0.9, -0.6))
-    seen: list[ViewEvidence] = list(likelihoods(rig.cameras, standing))
-    if kind == "boxes":
-        seen = [boxes(camera, standing) for camera in rig.cameras]
+    seen = evidence_of(kind, rig.cameras, standing)
     explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
     fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(seen, explanation).dense()
     away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
@@ -383,7 +372,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     assert (fused[:3, away < 0.15] > 0).all()  # the uppermost plane is above them
     assert (fused[:, away > 0.6] < 0).all()
     # A volume from nobody's evidence holds nobody.
-    empty: list[ViewEvidence] = [flat(0.0)] * 4 if kind == "pixels" else [no_boxes()] * 4
+    empty = evidence_of(kind, rig.cameras, people())
     nobody = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(empty, None)
     assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody).dense() < PRIOR).all()
 

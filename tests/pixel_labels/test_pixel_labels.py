@@ -1,7 +1,6 @@
 """Labels of pixels, and the appearance of people in them."""
 
-from __future__ import annotations
-
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -15,7 +14,6 @@ from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
 from stseg.bodies.outlines import outlines
 from stseg.bodies.pillars import WIDTH, BodyTable
 from stseg.config import BodyConfig, LabelConfig
-from stseg.errors import ConfigError
 from stseg.geometry import Camera
 from stseg.graphcut.grid_energy import QUANTUM
 from stseg.pixel_labels.appearance import SLICES, BodyRows, ColourSums, ViewAppearance, colour_log_ratios
@@ -42,13 +40,13 @@ def standing(everybody: Floats, spread: float = 0.0) -> PlacedPeople:
     return PlacedPeople(everybody[:, :2], covariance, everybody[:, 2], np.arange(1, len(everybody) + 1))
 
 
-def labels_in(camera: Camera, everybody: Floats, config: LabelConfig = FEW) -> Labels:
+def labels_of(camera: Camera, config: LabelConfig = FEW, body: BodyConfig = BODY) -> ViewLabels:
+    return ViewLabels(camera, BodyTable.of(camera, room().grid), config, body)
+
+
+def labels_in(camera: Camera, everybody: Floats) -> Labels:
     """Labels from the exact masks."""
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), config, BODY)
-    return view.label(standing(everybody), likelihoods([camera], everybody)[0], None)
-
-
-# Pillars
+    return labels_of(camera).label(standing(everybody), likelihoods([camera], everybody)[0], None)
 
 
 def test_one_certain_pillar_is_the_outline() -> None:
@@ -78,8 +76,7 @@ def test_coverage_falls_off_with_uncertainty() -> None:
 
 
 def test_a_person_out_of_view_has_no_patch() -> None:
-    ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
-    view = ViewLabels(ahead, BodyTable.of(ahead, room().grid), FEW, BODY)
+    view = labels_of(looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0)))
     behind = people((-1.5, 0.0))
     assert len(view.label_likelihood(standing(behind)).people.share) == 0
     bright = np.ones((96, 128), np.float32)
@@ -87,11 +84,8 @@ def test_a_person_out_of_view_has_no_patch() -> None:
     assert not view.label(standing(behind[:0]), bright, None).any()
 
 
-# The nearest
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_product_is_the_mean_over_all_combinations_of_draws(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     drawn = [rng.random((3, 2, 3)) < 0.6 for _ in range(count)]
@@ -108,11 +102,8 @@ def test_the_most_likely_label_is_the_start() -> None:
     np.testing.assert_array_equal(most_likely_labels(shown), reference.dense(shown).argmax(0))
 
 
-# The adjacency
-
-
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_weights_follow_the_sigmoid_and_are_not_negative(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 60, (3, 4, 3)).astype(np.uint8)
     config = LabelConfig(boundary_weight=3.0, contrast_limit=40.0, contrast_slope=10.0)
@@ -130,9 +121,6 @@ def test_without_colours_all_pairs_cost_the_same() -> None:
     np.testing.assert_array_equal(down * QUANTUM, np.repeat([[1.5], [1.5], [0.0]], 4, 1))
 
 
-# The energy
-
-
 def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> LabelLikelihood:
     """People whose rectangles lie anywhere in a window."""
     rows, columns = shape
@@ -146,13 +134,8 @@ def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int])
 
 def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikelihood, Singles, Bytes, LabelConfig]:
     rng = np.random.default_rng(seed)
-    config = LabelConfig(
-        foreground_weight=float(rng.uniform(0, 4)),
-        boundary_weight=float(rng.uniform(0, 2)),
-        contrast_limit=200.0,
-        contrast_slope=60.0,
-        outlier_rate=0.1,
-    )
+    config = LabelConfig(contrast_limit=200.0, contrast_slope=60.0, outlier_rate=0.1)
+    config = replace(config, foreground_weight=float(rng.uniform(0, 4)), boundary_weight=float(rng.uniform(0, 2)))
     shown = random_nearest(rng, 2, shape)
     foreground = rng.random(shown.background.shape).astype(np.float32)
     image = rng.integers(0, 256, (*shown.background.shape, 3)).astype(np.uint8)
@@ -161,7 +144,7 @@ def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikeli
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_energy_of_the_paper_with_pruned_labels(seed: int) -> None:
     ours, shown, foreground, image, config = problem(seed, (2, 3))
     shares, shape = reference.dense(shown), shown.background.shape
@@ -216,13 +199,10 @@ def test_the_nearer_of_two_hides_the_farther() -> None:
 
 def test_foreground_without_a_person_is_background() -> None:
     camera, everybody = corner_cameras()[2], people((-0.5, -0.5))
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
-    seen = likelihoods([camera], everybody)[0]
-    blotch = seen.copy()
+    blotch = likelihoods([camera], everybody)[0]
     blotch[:20, :20] = 1.0
-    np.testing.assert_array_equal(
-        view.label(standing(everybody), blotch, None), view.label(standing(everybody), seen, None)
-    )
+    label = labels_of(camera).label(standing(everybody), blotch, None)
+    np.testing.assert_array_equal(label, labels_in(camera, everybody))
 
 
 def test_similar_colours_fill_holes_and_reject_specks() -> None:
@@ -231,8 +211,7 @@ def test_similar_colours_fill_holes_and_reject_specks() -> None:
     rows, columns = np.nonzero(seen > 0.5)
     hole, speck = (round(float(rows.mean())), round(float(columns.mean()))), (int(rows.mean()), columns.max() + 3)
     seen[hole], seen[speck] = 0.0, 1.0
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
-    label = view.label(standing(everybody), seen, np.full((96, 128, 3), 80, np.uint8))
+    label = labels_of(camera).label(standing(everybody), seen, np.full((96, 128, 3), 80, np.uint8))
     assert label[hole] == 1
     assert label[speck] == 0
 
@@ -243,7 +222,7 @@ def test_a_border_between_two_people_follows_the_colours() -> None:
     near, far = (likelihoods([camera], everybody[j : j + 1])[0] > 0.5 for j in range(2))
     image = np.full((96, 128, 3), 60, np.uint8)
     image[near], image[far & ~near] = 20, 200
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
+    view = labels_of(camera)
     off = everybody + np.array([0.06, -0.06, 0.0])  # to the side, as the camera sees it
     truth = np.where(near, 1, np.where(far, 2, 0))
     plain, coloured = (view.label(standing(off, 0.1), seen, colours) for colours in (None, image))
@@ -253,14 +232,6 @@ def test_a_border_between_two_people_follows_the_colours() -> None:
 def test_the_same_again() -> None:
     camera, everybody = corner_cameras()[3], people((-0.5, 0.3), (0.3, 0.2))
     np.testing.assert_array_equal(labels_in(camera, everybody), labels_in(camera, everybody))
-
-
-@pytest.mark.parametrize(
-    "change", [{"contrast_slope": 0.0}, {"position_noise": 0.0}, {"samples": 0}, {"outlier_rate": 1.0}]
-)
-def test_constants_out_of_range(change: dict[str, float]) -> None:
-    with pytest.raises(ConfigError, match=next(iter(change))):
-        LabelConfig(**change)  # type: ignore[arg-type]  # each value has its field's type
 
 
 # Appearance
@@ -291,7 +262,7 @@ def density(colour: Floats, t: int, s: int, worn: ViewAppearance) -> float:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_ratios_are_those_of_the_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     likelihood, rows, image = two_rectangles(rng)
@@ -307,13 +278,7 @@ def test_ratios_are_those_of_the_definition(seed: int) -> None:
         for j in here:
             mean = sum(weight[i] * own[i] for i in here) / sum(weight.values())
             assert found[j, v - 2, u - (3, 5)[j]] == pytest.approx(np.log(own[j] / mean), abs=1e-4)
-
-
-def test_a_pixel_of_one_person_alone_says_nothing() -> None:
-    likelihood, rows, image = two_rectangles(np.random.default_rng(1))
-    worn = ColourSums.of(TRACKS).appearance()
-    found = colour_log_ratios(worn, likelihood, rows, TRACKS, image).reshape(2, 12, 3)
-    assert np.allclose(found[0, :, :2], 0, atol=1e-6)
+    np.testing.assert_allclose(found[0, :, :2], 0, atol=1e-6)  # of one person alone
 
 
 def test_colours_are_learned_from_certain_pixels() -> None:
@@ -340,9 +305,8 @@ def test_where_two_stand_in_one_another_the_colour_decides() -> None:
     """Two people at one place but for 10 cm, far to the side of their true border: shirts tell them apart."""
     camera, everybody = corner_cameras()[0], people((0.05, 0.0), (-0.05, 0.0))
     config = LabelConfig(samples=16, boundary_weight=0.5)
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), config, BodyConfig(width_spread=0.03))
-    covariance = np.tile(0.05**2 * np.eye(2), (2, 1, 1))
-    placed = PlacedPeople(everybody[:, :2], covariance, everybody[:, 2], TRACKS)
+    view = labels_of(camera, config, BodyConfig(width_spread=0.03))
+    placed = replace(standing(everybody, 0.05), track=TRACKS)
     foreground = likelihoods([camera], everybody)[0]
     truth: Ints = (np.arange(foreground.shape[1]) % 2)[None].repeat(foreground.shape[0], 0)
     colours = np.array([[200, 40, 40], [40, 40, 200]], np.uint8)

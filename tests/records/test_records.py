@@ -1,7 +1,5 @@
 """Forgetting sums, reliability of cells, and distance from the border."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -99,9 +97,7 @@ def test_cells_in_doubt() -> None:
     log_odds = np.full(GRID.shape, -9.0, np.float32)
     log_odds[0, 0, :2] = 1.0, np.nan
     found = doubtful_cells(GRID, log_odds, people((0.9, 0.9, 1.7)))
-    assert found[0, 0, 0]
-    assert not found[0, 0, 1]
-    assert not found[0, 0, 2]
+    assert found[0, 0, :3].tolist() == [True, False, False]
     assert found[:, -1, -1].all()
     log_odds[:, -1, -1] = np.nan
     assert not doubtful_cells(GRID, log_odds, people((0.9, 0.9, 1.7)))[:, -1, -1].any()
@@ -128,4 +124,5 @@ def test_points_have_the_distance_of_their_cell() -> None:
     (left, right), (low, high) = grid.x, grid.y
     out = np.array([[left - 0.01, 0], [right + 0.01, 0], [0, low - 0.01], [0, high + 0.01], [-1e30, 1e30]])
     np.testing.assert_array_equal(border.away(out), 0.0)
+    assert border.away(out[:0]).shape == (0,)
     assert border.distance.max() > 1.0

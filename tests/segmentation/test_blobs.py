@@ -1,7 +1,5 @@
 """Blobs of labelled cells and their measures, against plain NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -57,8 +55,6 @@ def measures(cells: Labels, track: Ints, label: Labels, log_odds: Singles, grid:
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 
-# Motion
-
 
 def test_cells_near_a_person_move_with_them() -> None:
     now = np.array([[0.55, 0.55], [1.45, 0.95]])
@@ -73,18 +69,12 @@ def test_cells_near_a_person_move_with_them() -> None:
 
 
 def test_a_track_not_detected_again_does_not_move() -> None:
-    here = np.array([[0.55, 0.55]])
-    for chains_then in ([], [9]):
-        then = np.tile([[1.0, 1.0]], (len(chains_then), 1))
-        motion = motion_field(here, then, np.array([3]), np.array(chains_then, np.int64), 0.3, GRID.cell, GRID.ground)
+    for now, then in (([3], []), ([3], [9]), ([], [3])):
+        here, there = np.full((len(now), 2), 0.55), np.full((len(then), 2), 1.0)
+        tracks = np.array(now, np.int64), np.array(then, np.int64)
+        motion = motion_field(here, there, *tracks, 0.3, GRID.cell, GRID.ground)
         assert motion.shape == (15, 20, 2)
         assert not motion.any()
-    assert not motion_field(
-        np.zeros((0, 2)), here, np.zeros(0, np.int64), np.array([3]), 0.3, GRID.cell, GRID.ground
-    ).any()
-
-
-# Blobs
 
 
 def disc(*places: tuple[float, float], radius: float = 0.22, tall: int = 3) -> Flags:
@@ -98,13 +88,9 @@ def disc(*places: tuple[float, float], radius: float = 0.22, tall: int = 3) -> F
 def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats | float = 2.0) -> Blobs:
     """Blobs of people with tracks 11, 12, ..., the cells within 0.4 m of one given to the nearest of them."""
     ground = np.array(standing).reshape(-1, 2)
-    log_odds = np.where(occupied, strength, -3.0).astype(np.float32)
-    label = np.where(
-        occupied, np.append(np.arange(len(ground)) + 11, UNASSIGNED)[nearest_person(GRID.ground, ground, 0.4)], 0
-    )
-    return find_blobs(
-        label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, GroundPatches.whole(GRID)
-    )
+    log_odds, tracks = np.where(occupied, strength, -3.0).astype(np.float32), np.arange(len(ground)) + 11
+    label = np.where(occupied, np.append(tracks, UNASSIGNED)[nearest_person(GRID.ground, ground, 0.4)], 0)
+    return find_blobs(label.astype(np.int32), log_odds, ground, tracks, 0.4, GroundPatches.whole(GRID))
 
 
 def test_a_person_is_a_blob() -> None:
@@ -165,9 +151,8 @@ def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
     label = np.zeros(GRID.shape, np.int32)
     label[1, 3, 3], label[1, 3, 8] = 4, 4
     label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
-    found = find_blobs(
-        label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, GroundPatches.whole(GRID)
-    )
+    nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
+    found = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, GroundPatches.whole(GRID))
     assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED]
     assert found.person.tolist() == [-1, -1, -1]
     np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
@@ -188,14 +173,13 @@ def test_a_column_belongs_to_the_label_with_most_mass() -> None:
 
 def test_a_blob_holds_the_detection_inside_it() -> None:
     label = disc((0.45, 0.75)).astype(np.int32) * 3
-    for x, held in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
-        found = find_blobs(
-            label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, GroundPatches.whole(GRID)
-        )
-        assert found.person.tolist() == held
+    for x, person in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
+        place, track = np.array([[x, 0.75]]), np.array([3])
+        found = find_blobs(label, label.astype(np.float32), place, track, 0.4, GroundPatches.whole(GRID))
+        assert found.person.tolist() == person
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
 @example([(2.0, 0.0)], 0)
 def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]], seed: int) -> None:
@@ -221,7 +205,7 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
     random = np.random.default_rng(seed)
     label = random.choice(np.array([0, 0, UNASSIGNED, 2, 5, 9], np.int32), GRID.shape)

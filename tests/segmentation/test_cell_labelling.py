@@ -1,7 +1,5 @@
 """Track labels of cells: subgraphs, shares of tracks, division of touching people, predicted places."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -44,7 +42,7 @@ def random_window(seed: int, shape: tuple[int, ...]) -> GridEnergy:
     return GridEnergy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, successor_cells(motion))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 999), st.sampled_from([(3, 2, 3, 4), (2, 3, 4, 3), (1, 2, 3, 3), (4, 1, 1, 5)]))
 def test_a_subgraph_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_window(seed, shape)
@@ -92,7 +90,7 @@ def places_at(
     )
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(numbers(0.6, 1.2), numbers(0.4, 1.0), numbers(0, 2.2), numbers(0.01, 0.3), st.booleans())
 def test_shares_by_definition(x: float, y: float, height: float, spread: float, gone: bool) -> None:
     places = places_at((0.8, 0.7), (1.1, 0.6), spread=spread)
@@ -135,8 +133,8 @@ def test_cells_above_a_head_belong_to_the_taller() -> None:
 
 def test_appearance_separates_tracks_in_one_place() -> None:
     places = places_at((1.0, 0.7), (1.0, 0.7))
-    looks = np.array([[2.0, -2.0], [-2.0, 2.0]])
-    share = share_at(places, (1.0, 0.7, 1.0), (1.0, 0.7, 1.0), appearance=looks)
+    appearance = np.array([[2.0, -2.0], [-2.0, 2.0]])
+    share = share_at(places, (1.0, 0.7, 1.0), (1.0, 0.7, 1.0), appearance=appearance)
     np.testing.assert_allclose(np.log(share[:, 0] / share[:, 1]), [4.0, -4.0])
 
 
@@ -283,19 +281,19 @@ def test_only_the_components_need_expansion(seed: int) -> None:
 # Places
 
 
-def sightings(*seen: tuple[int, int, float, float]) -> DetectionHistory:
+def detections(*found: tuple[int, int, float, float]) -> DetectionHistory:
     """Rows of frame, chain, x, y."""
-    rows = np.array(seen, float).reshape(-1, 4)
+    rows = np.array(found, float).reshape(-1, 4)
     n = len(rows)
     frame, chain = rows[:, :2].T.astype(np.int64)
     return DetectionHistory(frame, chain, rows[:, 2:], np.tile(np.eye(2) * 0.01, (n, 1, 1)), np.full(n, 1.8))
 
 
 def test_places_between_and_after_detections() -> None:
-    seen = sightings((14, 7, 1.4, 0.0), (10, 7, 1.0, 0.0), (12, 3, 0.0, 5.0))
-    places = predicted_places(seen, 8, 20, 8.0, CONFIG)
+    history = detections((14, 7, 1.4, 0.0), (10, 7, 1.0, 0.0), (12, 3, 0.0, 5.0))
+    places = predicted_places(history, 8, 20, 8.0, CONFIG)
     assert places.track.tolist() == [3, 7]
-    # From the first sighting on, for as long as a walker can be foreseen.
+    # From the first detection on, for as long as a track can be predicted.
     ahead = int(CONFIG.prediction_horizon * 8.0)
     frames = np.arange(8, 20)
     assert frames[places.expected[:, 1]].tolist() == list(range(10, 14 + ahead + 1))
@@ -315,7 +313,7 @@ def test_places_are_carried_from_the_window_before() -> None:
         tail.add(frame, 0, np.array([0.1 * frame, 1.0]))
     before = earlier_detections([tail], 10, 1.7, MotionConfig())
     assert before.frame.tolist() == [6, 7, 8, 9]
-    places = predicted_places(together([before, sightings((11, 5, 1.2, 1.0))]), 10, 12, 8.0, CONFIG)
+    places = predicted_places(together([before, detections((11, 5, 1.2, 1.0))]), 10, 12, 8.0, CONFIG)
     np.testing.assert_allclose(places.ground[0, 0], [1.05, 1.0])
     alone = predicted_places(before, 10, 12, 8.0, CONFIG)
     np.testing.assert_allclose(alone.ground[:, 0], [[1.0, 1.0], [1.1, 1.0]])
@@ -323,8 +321,7 @@ def test_places_are_carried_from_the_window_before() -> None:
 
 
 def test_no_track_is_predicted() -> None:
-    places = predicted_places(
-        together([earlier_detections([], 4, 1.7, MotionConfig()), sightings()]), 4, 9, 8.0, CONFIG
-    )
+    nothing = together([earlier_detections([], 4, 1.7, MotionConfig()), detections()])
+    places = predicted_places(nothing, 4, 9, 8.0, CONFIG)
     assert places.ground.shape == (5, 0, 2)
     assert places.expected.shape == (5, 0)

@@ -1,6 +1,4 @@
-"""Patches of the ground: a window that is cut there alone has the labels of the whole ground."""
-
-from __future__ import annotations
+"""GroundPatches of the ground: a window that is cut there alone has the labels of the whole ground."""
 
 from dataclasses import replace
 
@@ -59,19 +57,13 @@ def commits(weak: float) -> list[Commit]:
 def test_patches_are_enough(weak: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Labels, tracks, energy and undecided cells of the windows are those of the whole ground."""
     cut_out = commits(weak)
-
-    def every(grid: Grid, squares: object) -> GroundPatches:
-        del squares
-        return GroundPatches.whole(grid)
-
-    monkeypatch.setattr(GroundPatches, "of", every)
+    monkeypatch.setattr(GroundPatches, "of", lambda grid, squares: GroundPatches.whole(grid))  # noqa: ARG005
     whole = commits(weak)
     assert sum(len(commit.trajectory) for commit in whole) > 3 * FRAMES
     for one, other in zip(cut_out, whole, strict=True):
         np.testing.assert_array_equal(one.label, other.label)
-        assert one.trajectory.tobytes() == other.trajectory.tobytes()
-        assert one.events.tobytes() == other.events.tobytes()
-        assert one.windows.tobytes() == other.windows.tobytes()
+        for name in ("trajectory", "events", "windows"):
+            assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
 
 
 def test_patches_are_apart_and_hold_what_is_marked() -> None:

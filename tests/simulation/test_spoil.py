@@ -1,7 +1,5 @@
 """Spoiled masks and boxes: each kind does what it says, the same each time; and what a small corner of them costs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,8 +32,8 @@ def test_errors_repeat_for_a_frame_and_vanish_at_strength_zero(kind: str) -> Non
     strong = STRENGTHS[kind][2]
     np.testing.assert_array_equal(spoiled(kind, strong), spoiled(kind, strong))
     assert not np.array_equal(spoiled(kind, 1.0 if kind == "flicker" else strong), MASK)
-    if kind != "jpeg":
-        np.testing.assert_array_equal(spoiled(kind, 0.0) if kind != "shadows" else MASK, MASK)
+    if kind not in ("jpeg", "shadows"):
+        np.testing.assert_array_equal(spoiled(kind, 0.0), MASK)
 
 
 def test_silhouettes_grow_and_shrink_by_a_share_of_a_bodys_width() -> None:

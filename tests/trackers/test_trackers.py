@@ -1,16 +1,13 @@
 """The trackers on crafted scenes: every frame committed once, the same whatever part is run, labels that say who."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import CONFIG, FRAME_RATE, found, people, room
+from coloured_people import RIG, rows_of
+from scenes import CONFIG, FRAME_RATE, found, people
 
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Floats
 from stseg.errors import ConfigError
 from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.grid_energy import QUANTUM
@@ -20,7 +17,6 @@ from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, Trac
 from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows, views_at
 from stseg.tracking.windows.windows import window_length, windows
 
-RIG = room()
 COLOURLESS = sorted(set(TRACKERS) - {"particles", "belief"})
 """Trackers that need no colour; the others have tests of their own."""
 UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
@@ -51,10 +47,6 @@ def run(tracker: str, first: int, stop: int, rest: bool = True) -> list[Commit]:
         commit for frame in range(first, stop) for commit in follow.add(scene(follow, frame, *crossing(frame)), UNSEEN)
     ]
     return done + follow.finish() if rest else done
-
-
-def rows_of(commits: Sequence[Commit]) -> Rows:
-    return np.concatenate([commit.trajectory for commit in commits])
 
 
 @pytest.mark.parametrize("tracker", COLOURLESS)
@@ -130,10 +122,8 @@ def test_what_is_committed_early_does_not_change() -> None:
     early, whole = run("cut", 0, 17, rest=False), run("cut", 0, 30)
     assert 0 < len(early) < len(whole)
     for one, other in zip(early, whole, strict=False):
-        np.testing.assert_array_equal(one.trajectory, other.trajectory)
-        np.testing.assert_array_equal(one.label, other.label)
-        np.testing.assert_array_equal(one.windows, other.windows)
-        np.testing.assert_array_equal(one.events, other.events)
+        for name in ("trajectory", "label", "windows", "events"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def test_who_touches_is_cut_apart() -> None:
@@ -199,9 +189,6 @@ def test_an_unknown_tracker_is_refused() -> None:
         find_tracker("magic")(RIG, CONFIG, 0)
 
 
-# Rows
-
-
 def test_nearest_person_within_reach() -> None:
     standing = np.array([[0.0, 0.0], [1.0, 0.0]])
     asked = np.array([[[0.1, 0.0], [0.6, 0.0]], [[0.5, 2.0], [1.0, 0.4]]])
@@ -233,11 +220,3 @@ def test_events_in_rows() -> None:
     rows = event_rows([(3, "hand-over", 5, 0, "found again after 2 unseen frames")])
     assert rows.tolist() == [(3, b"hand-over", 5, 0, b"found again after 2 unseen frames")]
     assert len(event_rows([])) == 0
-
-
-def test_commits_follow_each_other() -> None:
-    commits = run("cut", 3, 30)
-    assert len(commits) > 1
-    for before, after in pairwise(commits):
-        assert before.windows["commit_stop"][0] == after.windows["commit_first"][0]
-        assert before.frames[-1].frame + 1 == after.frames[0].frame

@@ -1,7 +1,5 @@
 """The area and its border, encounters of tracks and their events."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import combinations, islice, pairwise
@@ -13,7 +11,7 @@ from hypothesis import strategies as st
 from scenes import boxes, found, people, room
 
 from stseg import Tracker
-from stseg.arrays import Bytes, Flags, Floats, Observation, Rows
+from stseg.arrays import Floats, Observation, Rows
 from stseg.config import Config, TrackingConfig
 from stseg.engine.committed_frames import within_area
 from stseg.engine.pipeline import Pipeline
@@ -137,23 +135,16 @@ def switches(name: str, kind: str, stop: int) -> int:
     """How often somebody is taken for somebody else in the first frames of a scene."""
     rig, film = SceneFilm(NAMED[name]).rig, filmed(name, stop)
     pipeline = Pipeline(rig, [kind] * len(rig.cameras), Config(), "cut")
-    if kind == "boxes":
-        moments = [FrameSet(seen.frame, tuple(view.boxes for view in seen.views)) for seen in film]
-    else:
-        moments = [FrameSet(seen.frame, tuple(silhouette(view.instances > 0) for view in seen.views)) for seen in film]
-    done: list[int] = []
-    commits = [
-        step.commit for step in run_session(pipeline, [ViewForeground() for _ in rig.cameras], moments, 0, done.append)
+    frames = [
+        FrameSet(one.frame, tuple(view.boxes if kind == "boxes" else view.mask for view in one.views)) for one in film
     ]
+    foreground = [ViewForeground() for _ in rig.cameras]
+    commits = [step.commit for step in run_session(pipeline, foreground, frames, 0, lambda _: None)]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
     tracks, _ = pipeline.finished(rows, events, np.zeros(0, APPEARANCE))
     scores = evaluate(np.concatenate([seen.truth for seen in film]), tracks.trajectory)
     assert scores.misses <= 0.02 * scores.truths
     return scores.switches
-
-
-def silhouette(shown: Flags) -> Bytes:
-    return np.where(shown, 255, 0).astype(np.uint8)
 
 
 @pytest.mark.skipif(INTERPRETED, reason="whole scenes need the compiler")
@@ -215,7 +206,7 @@ def plain(touching: list[set[tuple[int, int]]], names: list[int], parting: int) 
 PAIRS = st.sets(st.sampled_from([(0, 1), (0, 2), (1, 3), (2, 3)]), max_size=3)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     st.lists(PAIRS, min_size=LENGTH, max_size=LENGTH), st.permutations([0, 1, 2, 7]),
     st.lists(st.integers(1, LENGTH - 1), max_size=5), st.integers(0, 6),

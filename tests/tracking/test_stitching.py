@@ -1,31 +1,26 @@
 """Segments of a recording: how it is divided, and how what they find is joined."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from run_files import trajectory_of
 
 from stseg.arrays import Rows
 from stseg.config import Config, SegmentConfig, TrackingConfig
 from stseg.engine.offline.segments import segments
-from stseg.errors import ConfigError
-from stseg.records.tables import EVENT, TRAJECTORY
+from stseg.records.tables import TRAJECTORY
+from stseg.trackers.rows import event_rows
 from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
 from stseg.tracking.windows.windows import windows
 
 
-def walk(track: int, frames: range, x: float, speed: float = 0.0) -> Rows:
-    """Somebody who walks along y = 1 + track."""
-    rows = np.zeros(len(frames), TRAJECTORY)
-    rows["frame"], rows["id"] = frames, track
-    rows["x"], rows["y"] = x + speed * np.array(frames), 1.0
-    return rows
+def standing(track: int, frames: range, x: float) -> Rows:
+    return trajectory_of(*((frame, track, x, 1.0) for frame in frames))
 
 
-def events(*told: tuple[int, str, int, int]) -> Rows:
-    return np.array([(frame, kind.encode(), i, other, b"said") for frame, kind, i, other in told], EVENT)
+def events(*rows: tuple[int, str, int, int]) -> Rows:
+    return event_rows([(*row, "reason") for row in rows])
 
 
 def stitched(*segments: tuple[Rows, Rows]) -> StitchedTracks:
@@ -36,10 +31,7 @@ def stitched(*segments: tuple[Rows, Rows]) -> StitchedTracks:
     return stitcher.joined()
 
 
-# How a recording is divided
-
-
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.floats(1.0, 30.0), st.integers(0, 500), st.integers(1, 3000), st.floats(1.0, 60.0), st.integers(0, 10)
 )  # fmt: skip
@@ -64,7 +56,7 @@ def test_less_than_two_segments_become_two_of_equal_work() -> None:
             assert abs((parts[0].stop - parts[0].lead) - (parts[1].stop - parts[1].lead)) <= 2 * 10
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(1.0, 30.0), st.integers(0, 200), st.integers(100, 1500))
 def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> None:
     config = Config(segments=SegmentConfig(length=10.0, warm_up=2.0))
@@ -75,12 +67,9 @@ def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> 
         assert part.first == part.lead or part.first in ends
 
 
-# How segments are joined
-
-
 def test_a_track_keeps_its_name_over_a_seam() -> None:
-    first = np.concatenate([walk(1, range(20), 0.0), walk(2, range(20), 4.0)])
-    later = np.concatenate([walk(1, range(15, 40), 4.1), walk(2, range(15, 40), 0.1)])
+    first = np.concatenate([standing(1, range(20), 0.0), standing(2, range(20), 4.0)])
+    later = np.concatenate([standing(1, range(15, 40), 4.1), standing(2, range(15, 40), 0.1)])
     joined = stitched((first, events((0, "birth", 1, 0))), (later, events((25, "merge", 1, 2))))
     assert joined.committed["frame"].tolist() == [*range(20), *range(20), *range(20, 40), *range(20, 40)]
     assert joined.committed["id"].tolist() == [1] * 20 + [2] * 20 + [2] * 20 + [1] * 20
@@ -91,11 +80,11 @@ def test_a_track_keeps_its_name_over_a_seam() -> None:
 @pytest.mark.parametrize(
     ("first", "later", "told"),
     [
-        ((walk(1, range(20), 0.0), events()), (walk(1, range(18, 40), 3.0), events()), (19, 20)),
+        ((standing(1, range(20), 0.0), events()), (standing(1, range(18, 40), 3.0), events()), (19, 20)),
         # What a segment says itself is not told again.
         (
-            (walk(1, range(19), 0.0), events((18, "death", 1, 0))),
-            (walk(1, range(21, 40), 3.0), events((21, "birth", 1, 0))),
+            (standing(1, range(19), 0.0), events((18, "death", 1, 0))),
+            (standing(1, range(21, 40), 3.0), events((21, "birth", 1, 0))),
             (18, 21),
         ),
     ],
@@ -111,8 +100,10 @@ def test_unclaimed_tracks_end_and_begin_at_the_seam(
 
 def test_a_track_of_the_warm_up_alone_leaves_nothing() -> None:
     seams = Stitcher()
-    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
-    seams.add(SegmentTracks(20, np.concatenate([walk(1, range(15, 40), 0.0), walk(2, range(15, 19), 5.0)]), events()))
+    seams.add(SegmentTracks(0, standing(1, range(20), 0.0), events()))
+    seams.add(
+        SegmentTracks(20, np.concatenate([standing(1, range(15, 40), 0.0), standing(2, range(15, 19), 5.0)]), events())
+    )
     assert np.unique(seams.joined().committed["id"]).tolist() == [1]
     assert len(seams.joined().events) == 0
 
@@ -120,17 +111,14 @@ def test_a_track_of_the_warm_up_alone_leaves_nothing() -> None:
 def test_the_track_that_is_shared_longest_wins() -> None:
     """One to one: two tracks of the warm-up lie near one earlier track."""
     seams = Stitcher()
-    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
-    both = np.concatenate([walk(1, range(17, 40), 0.2), walk(2, range(10, 40), -0.2)])
+    seams.add(SegmentTracks(0, standing(1, range(20), 0.0), events()))
+    both = np.concatenate([standing(1, range(17, 40), 0.2), standing(2, range(10, 40), -0.2)])
     seams.add(SegmentTracks(20, both, events()))
     later = seams.joined()
     assert later.committed["id"][later.local == 2].tolist()[-1] == 1
 
 
-# Names in the volume
-
-
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.integers(0, 6), min_size=12, max_size=12),
     st.lists(st.tuples(st.integers(0, 3), st.integers(1, 6)), unique=True, max_size=12),
@@ -148,10 +136,3 @@ def test_renaming_maps_every_cell_once(ids: list[int], keys: list[tuple[int, int
         plain[cell] = name_of.get((int(frames[cell[0]]), int(label[cell])), 0)
     rename_labels(label, frames, rows, identity)
     np.testing.assert_array_equal(label, plain)
-
-
-def test_segments_take_time() -> None:
-    with pytest.raises(ConfigError, match="length"):
-        SegmentConfig(length=0.0)
-    with pytest.raises(ConfigError, match="background"):
-        SegmentConfig(background_period=0.0)

@@ -1,14 +1,12 @@
 """The filter of tracks from frame to frame: against the textbook's, its consistency, and tracks in named scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scenes import CONFIG, found, people
 from strategies import numbers
@@ -55,7 +53,6 @@ def test_constant_velocity(state: Floats, first: float, second: float) -> None:
     assert at_once.height_variance == pytest.approx(in_steps.height_variance)
 
 
-@settings(deadline=None)
 @given(STATES, numbers(-1, 1), numbers(-1, 1), numbers(0.02, 0.5), numbers(-0.8, 0.8), numbers(0, 0.1))
 def test_a_correction_is_the_textbooks(state: Floats, x: float, y: float, sd: float, slant: float, q: float) -> None:
     """A posterior of the body's place under its prediction holds all of a measurement of the body."""

@@ -1,18 +1,16 @@
 """The check of a run's views, and knocks found in residuals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from recordings import compiled_only, track, write_recording
-from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, people, room
+from scenes import BODY, FEW_HEIGHTS, evidence_of, people, room
 
-from stseg.arrays import Bytes, Floats, ViewEvidence
+from stseg.arrays import Bytes, Floats
 from stseg.detection.detector import Detector
-from stseg.geometry import Camera, Rig
+from stseg.geometry import Rig
 from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.runfile.runs import read_run
 from stseg.simulation import SceneSpec
@@ -27,32 +25,29 @@ CELL = 0.1
 
 def moved(rig: Rig, view: int, pixels: float) -> Rig:
     """The rig with one view's picture of the ground moved to the right."""
-    camera = rig.cameras[view]
     shift = np.array([[1.0, 0.0, pixels], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    there = Camera(camera.name, camera.size, shift @ camera.ground, shift @ camera.vertical, camera.lens)
-    return replace(rig, cameras=tuple(there if k == view else one for k, one in enumerate(rig.cameras)))
+    cameras = list(rig.cameras)
+    camera = cameras[view]
+    cameras[view] = replace(camera, ground=shift @ camera.ground, vertical=shift @ camera.vertical)
+    return replace(rig, cameras=tuple(cameras))
 
 
-def told(rig: Rig, kind: str, standing: Floats) -> Floats:
-    """What the frame tells of each view of a rig, of people as the room's own cameras show them."""
-    seen: list[ViewEvidence] = (
-        list(likelihoods(room().cameras, standing))
-        if kind == "pixels"
-        else [boxes(camera, standing) for camera in room().cameras]
-    )
-    return Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None).residual
+def residuals(rig: Rig, kind: str, standing: Floats) -> Floats:
+    """Residual of each view of a rig, of people as the room's own cameras show them."""
+    views = evidence_of(kind, room().cameras, standing)
+    return Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(views, None).residual
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_views_of_a_sound_rig_are_not_aside(kind: str) -> None:
     standing = people((-0.4, 0.1))
-    assert np.abs(told(room(), kind, standing)).max() < 0.03
+    assert np.abs(residuals(room(), kind, standing)).max() < 0.03
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 @pytest.mark.parametrize("pixels", [6.0, -6.0])
 def test_the_wrong_view_is_the_one_aside_and_to_which_side(kind: str, pixels: float) -> None:
-    aside = told(moved(room(), 1, pixels), kind, people((-0.4, 0.1)))
+    aside = residuals(moved(room(), 1, pixels), kind, people((-0.4, 0.1)))
     assert np.nanargmax(np.abs(aside)) == 1
     # The rig says that people appear further right than they do: the view sees them to the left.
     assert aside[1] * pixels < 0
@@ -63,7 +58,7 @@ def test_who_stands_before_another_tells_nothing() -> None:
     place = np.array([-0.6, -0.6])
     away = place - camera.centre[:2]
     behind = place + 1.6 * away / np.hypot(*away)
-    aside = told(room(), "pixels", people(tuple(place), tuple(behind)))
+    aside = residuals(room(), "pixels", people(tuple(place), tuple(behind)))
     assert np.isnan(aside[0]) and np.isfinite(aside[1:]).any()
 
 
@@ -107,12 +102,7 @@ def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureF
     assert track(tmp_path / "wrong.toml", tmp_path / "wrong.h5") == 0
     warned = capsys.readouterr().err
     assert "view east sees people" in warned and "to the left of where the views put them" in warned
-    assert any(
-        "view east sees people" in warning for warning in summarise_run(read_run(tmp_path / "wrong.h5")).warnings
-    )
-
-
-# Residuals
+    assert any("view east sees people" in line for line in summarise_run(read_run(tmp_path / "wrong.h5")).warnings)
 
 
 def correlated(frames: int, views: int, seed: int, correlation: float = 0.6) -> Floats:

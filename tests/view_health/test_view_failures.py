@@ -1,7 +1,5 @@
 """Views that fail, freeze or are knocked: when they are left out, and when they count again."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,13 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, looking, people, rig_of, room
+from scenes import BODY, FEW_HEIGHTS, evidence_of, expecting, likelihoods, looking, no_boxes, people, rig_of, room
 
 from stseg import Tracker
-from stseg.arrays import Boxes, Bytes, Floats, Observation, ViewEvidence
+from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence
 from stseg.config import ErrorRateConfig
 from stseg.detection.detector import Detector
 from stseg.noise.estimates import Estimates
+from stseg.records.tables import Tracks
 from stseg.view_health.blind_views import FrozenViews
 from stseg.view_health.knocked_views import KnockedViews, found_pixels
 from stseg.view_health.view_failures import informedness
@@ -23,6 +22,7 @@ from stseg.view_health.view_failures import informedness
 STANDING = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
 RATE = 10.0
 FAILED = 2
+KINDS = ("pixels", "boxes")
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))
@@ -46,8 +46,7 @@ def session(kind: str, views: int = 4) -> tuple[Detector, Estimates]:
 
 
 def shown(kind: str, standing: Floats = STANDING, views: int = 4) -> list[ViewEvidence]:
-    cameras = room().cameras[:views]
-    return list(likelihoods(cameras, standing)) if kind == "pixels" else [boxes(camera, standing) for camera in cameras]
+    return evidence_of(kind, room().cameras[:views], standing)
 
 
 def explained(asked: Detector, learned: Estimates, seen: Sequence[ViewEvidence], frames: int) -> None:
@@ -56,9 +55,8 @@ def explained(asked: Detector, learned: Estimates, seen: Sequence[ViewEvidence],
 
 
 def failed(kind: str, failure: str, seen: Sequence[ViewEvidence]) -> list[ViewEvidence]:
-    if kind == "boxes":
-        bad: ViewEvidence = Boxes(np.zeros((0, 4)), np.zeros(0))
-    else:
+    bad: ViewEvidence = no_boxes()
+    if kind == "pixels":
         level = {"black": np.zeros, "white": np.ones}.get(failure, np.random.default_rng(3).random)
         bad = np.asarray(level(np.asarray(seen[FAILED]).shape), np.float32)
     return [bad if k == FAILED else own for k, own in enumerate(seen)]
@@ -129,48 +127,40 @@ def test_a_detector_that_misses_boxes_excludes_no_view(missed: float) -> None:
     assert learned.failures.failing.tolist() == [k == FAILED for k in range(4)]
 
 
-def delivered(kind: str, standing: Floats) -> list[Observation]:
-    if kind == "boxes":
-        return [boxes(camera, standing) for camera in room().cameras]
-    return [np.asarray(255 * (view > 0.5), np.uint8) for view in likelihoods(room().cameras, standing)]
+def swaying(kind: str, frame: int, views: int) -> list[ViewEvidence]:
+    return shown(kind, STANDING + np.array([0.04, 0.02, 0.0]) * np.sin(0.3 * frame), views)
 
 
-def nothing(view: Observation) -> Observation:
-    if isinstance(view, Boxes):
-        return Boxes(np.zeros((0, 4)), np.zeros(0))
-    return np.zeros_like(np.asarray(view, np.uint8))
-
-
-def moved(frame: int) -> Floats:
-    return np.asarray(STANDING + np.array([0.04, 0.02, 0.0]) * np.sin(0.3 * frame))
-
-
-@pytest.mark.parametrize("kind", ["masks", "boxes"])
-def test_a_run_says_from_when_to_when_a_view_is_left_out(kind: str) -> None:
-    rig = replace(room(), frame_rate=RATE)
-    tracker, results = Tracker(rig), []
-    for frame in range(45):
-        views = delivered(kind, moved(frame))
-        if 15 <= frame < 30:
-            views[FAILED] = nothing(views[FAILED])
-        results += tracker.add(views)
+def run(frames: Sequence[Sequence[ViewEvidence]]) -> tuple[Rows, Tracks]:
+    """Events of blind views, and the tracks, of what cameras deliver; likelihoods as masks."""
+    tracker, results = Tracker(replace(room(), frame_rate=RATE, cameras=room().cameras[: len(frames[0])])), []
+    for views in frames:
+        masks = [one if isinstance(one, Boxes) else np.uint8(255) * (np.asarray(one) > 0.5) for one in views]
+        results += tracker.add(masks)
     results += tracker.finish()
     events = np.concatenate([result.events for result in results])
-    events = events[events["kind"] == b"blind"]
-    name = rig.cameras[FAILED].name.encode()
+    return events[events["kind"] == b"blind"], tracker.tracks(results)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_says_from_when_to_when_a_view_is_left_out(kind: str) -> None:
+    frames = [swaying(kind, frame, 4) for frame in range(45)]
+    for views in frames[15:30]:
+        views[FAILED] = shown(kind, people())[FAILED]
+    events, tracks = run(frames)
+    name = room().cameras[FAILED].name.encode()
     assert [name in reason for reason in events["reason"]] == [True, True]
     assert 15 <= events["frame"][0] < 20
     assert 30 < events["frame"][1] < 36
     assert b"excluded" in events["reason"][0]
     assert f"after {events['frame'][1] - events['frame'][0]} frames".encode() in events["reason"][1]
-    assert len(tracker.tracks(results).summary()) == len(STANDING)
+    assert len(tracks.summary()) == len(STANDING)
 
 
 # Knocked views
 
 
 KNOCKED = 2
-KINDS = ("pixels", "boxes")
 
 
 def aside(view: ViewEvidence, pixels: int) -> ViewEvidence:
@@ -259,31 +249,16 @@ def test_of_two_views_none_is_knocked() -> None:
     assert watch.compare([seen[0], aside(seen[1], 7)], 3) == [False] * 2
 
 
-def delivered_by_three(kind: str, frame: int, push: int) -> list[Observation]:
-    """What cameras deliver of people who sway, while one of them is pushed by so many pixels."""
-    standing = np.asarray(STANDING + np.array([0.04, 0.02, 0.0]) * np.sin(0.3 * frame))
-    seen = [aside(view, push if k == KNOCKED else 0) for k, view in enumerate(shown(kind, standing, 3))]
-    return [view if isinstance(view, Boxes) else as_mask(np.asarray(view)) for view in seen]
-
-
-def as_mask(likelihood: Floats) -> Bytes:
-    return np.asarray(255 * (likelihood > 0.5), np.uint8)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_run_says_when_one_of_three_views_is_knocked(kind: str) -> None:
-    rig = replace(room(), frame_rate=RATE, cameras=room().cameras[:3])
-    tracker, results = Tracker(rig), []
-    for frame in range(40):
-        results += tracker.add(delivered_by_three(kind, frame, 7 if 15 <= frame < 30 else 0))
-    results += tracker.finish()
-    events = np.concatenate([result.events for result in results])
-    events = events[events["kind"] == b"blind"]
-    assert [rig.cameras[KNOCKED].name.encode() in reason for reason in events["reason"]] == [True, True]
+    frames = [swaying(kind, frame, 3) for frame in range(40)]
+    for views in frames[15:30]:
+        views[KNOCKED] = aside(views[KNOCKED], 7)
+    events, tracks = run(frames)
+    assert [room().cameras[KNOCKED].name.encode() in reason for reason in events["reason"]] == [True, True]
     assert events["frame"][0] == 15
     assert 30 < events["frame"][1] < 36
     assert b"as after a push: excluded" in events["reason"][0]
-    tracks = tracker.tracks(results)
     assert len(tracks.summary()) == len(STANDING)
     rows = tracks.trajectory
     away = np.hypot(rows["x"][:, None] - STANDING[:, 0], rows["y"][:, None] - STANDING[:, 1]).min(1)
