@@ -15,6 +15,7 @@ from reference_core import best_pairs
 from stseg.arrays import Boxes, Bytes, Floats, Rows, Singles, ViewEvidence
 from stseg.bodies.pillars import PROFILE, SILHOUETTE
 from stseg.config import BodyConfig, Config, DetectionConfig
+from stseg.detection.detector import Detector
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.io.recording.frames import FrameSet
 from stseg.records.people import People
@@ -178,6 +179,11 @@ def likelihoods(cameras: Sequence[Camera], standing: Floats) -> list[Singles]:
 def evidence_of(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
     """Exact silhouettes for "pixels", else a box of each person."""
     return list(likelihoods(cameras, standing)) if kind == "pixels" else [boxes(one, standing) for one in cameras]
+
+
+def detector_of(rig: Rig, kind: str) -> Detector:
+    """The pass with few heights, of views of one kind."""
+    return Detector(rig, [kind] * len(rig.cameras), FEW_HEIGHTS, BODY)
 
 
 def three_people(share: Floats) -> Floats:

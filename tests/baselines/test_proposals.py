@@ -12,6 +12,7 @@ from scenes import (
     FEW_HEIGHTS,
     box_frame_sets,
     corner_cameras,
+    detector_of,
     evidence_of,
     expecting,
     mask_frame_sets,
@@ -26,7 +27,6 @@ from scenes import (
 from stseg.arrays import ViewEvidence
 from stseg.baselines.huang_wang_2012.proposals import Fuse, Proposals, marginal
 from stseg.config import ProposalConfig
-from stseg.detection.detector import Detector
 from stseg.engine.pipeline import Pipeline, find_candidate_source
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
@@ -108,7 +108,7 @@ def test_duplicates_are_dropped_in_order() -> None:
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_detection_keeps_people_of_proposals_and_drops_others(kind: str) -> None:
-    frame_pass = Detector(RIG, [kind] * 4, FEW_HEIGHTS, BODY)
+    frame_pass = detector_of(RIG, kind)
     proposed = pool(*(tuple(place) for place in STANDING[:, :2]), (-1.5, 1.5), (0.0, 1.6))
     plain, given = (frame_pass.explain(evidence(kind), None, asked).people for asked in (None, proposed))
     assert len(plain) == len(given) == len(STANDING)
@@ -117,7 +117,7 @@ def test_detection_keeps_people_of_proposals_and_drops_others(kind: str) -> None
 
 
 def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
-    frame_pass = Detector(RIG, ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    frame_pass = detector_of(RIG, "pixels")
     expected = expecting(*STANDING.tolist())
     proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
     found = frame_pass.explain(evidence("pixels"), expected, proposed).people

@@ -5,21 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scenes import (
-    BODY,
-    CONFIG,
-    FEW_HEIGHTS,
-    boxes,
-    corner_cameras,
-    evidence_of,
-    expecting,
-    likelihoods,
-    looking,
-    mask,
-    people,
-    rig_of,
-    room,
-)
+from scenes import CONFIG, boxes, corner_cameras, detector_of, evidence_of, expecting, looking, mask, people, rig_of
 
 from stseg.arrays import Floats, Shorts, Singles
 from stseg.detection.detector import Detector
@@ -62,7 +48,7 @@ def facing_pair() -> Rig:
 @cache
 def pass_of(kind: str, cameras: int) -> Detector:
     """The pass under the first corner cameras."""
-    return Detector(rig_of(corner_cameras()[:cameras]), [kind] * cameras, FEW_HEIGHTS, BODY)
+    return detector_of(rig_of(corner_cameras()[:cameras]), kind)
 
 
 def assert_these(explanation: Explanation, standing: Floats, ghosts: int = 0) -> None:
@@ -77,7 +63,7 @@ def assert_these(explanation: Explanation, standing: Floats, ghosts: int = 0) ->
 @pytest.mark.parametrize("kind", KINDS)
 def test_figure_4(kind: str) -> None:
     rig = facing_pair()
-    explanation = Detector(rig, [kind] * 2, FEW_HEIGHTS, BODY).explain(evidence_of(kind, rig.cameras, FIGURE_4), None)
+    explanation = detector_of(rig, kind).explain(evidence_of(kind, rig.cameras, FIGURE_4), None)
     # A box knows how far away its person is, so its lines of sight cross nowhere else.
     assert_these(explanation, FIGURE_4, ghosts=2 if kind == "pixels" else 0)
     assert distances(FIGURE_4[:, :2], explanation.people.ground).min(1).max() < 0.2
@@ -154,19 +140,20 @@ def test_a_ghost_that_moves_with_its_makers(kind: str) -> None:
 def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
     """It was there to be picked up: taken by itself it is worth a person, in nearly every frame."""
     rig, worth = facing_pair(), 0
-    frame_pass = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY)
-    nothing_known = Prior.of(None, FEW_HEIGHTS, BODY, frame_pass.border)
+    frame_pass = detector_of(rig, "pixels")
+    config = frame_pass.config
+    nothing_known = Prior.of(None, config, frame_pass.body, frame_pass.border)
     ground = frame_pass.lattice_ground.reshape(-1, 2)
     for frame in range(FRAMES):
-        views = frame_pass.observe(likelihoods(rig.cameras, strollers(frame)))
+        views = frame_pass.observe(evidence_of("pixels", rig.cameras, strollers(frame)))
         score = np.zeros((3, len(ground)))
         evidence, lattice = frame_pass.evidence(views, nothing_known), frame_pass.pixel_lattice
         no_owner = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
         pixels = UnexplainedPixels.of(evidence.rasters, no_owner, lattice, evidence.extremes)
-        weight = FEW_HEIGHTS.effective_observations
+        weight = config.effective_observations
         fill_scores(pixels, lattice, np.array([1]), np.zeros(0, np.int64), -np.inf, weight, score)
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
-        worth += score[1, here].max() > -FEW_HEIGHTS.prior_log_odds
+        worth += score[1, here].max() > -config.prior_log_odds
     assert worth > 0.8 * FRAMES
 
 
@@ -185,7 +172,7 @@ def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
     """Seen by all at first; then three taller people step between them and three of the cameras, and stand there."""
-    rig, follow = room(), TrackFilter(8.0, CONFIG)
+    rig, follow = rig_of(corner_cameras()), TrackFilter(8.0, CONFIG)
     hidden, who = people((0.0, 0.0, 1.6)), set[int]()
     for frame in range(FRAMES):
         side = max(1.2 - 0.1 * frame, 0.0)
@@ -208,7 +195,7 @@ def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
 
 
 BACKGROUND = np.float32(-2.2)
-DETECTOR = Detector(rig_of(corner_cameras(), cell=0.5, planes=3), ["pixels"] * 4, FEW_HEIGHTS, BODY)
+DETECTOR = detector_of(rig_of(corner_cameras(), cell=0.5, planes=3), "pixels")
 LATTICE = DETECTOR.pixel_lattice
 CELLS = DETECTOR.lattice_ground[..., 0].size
 WEIGHT, SCORE_BEFORE = 0.5, 4.2

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scenes import BODY, CONFIG, FEW_HEIGHTS, evidence_of, expecting, people, room, standing_at, walkers
+from scenes import CONFIG, FEW_HEIGHTS, detector_of, evidence_of, expecting, people, room, standing_at, walkers
 
 from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
@@ -23,7 +23,7 @@ HERE = ((-0.83, 0.31, 1.7), (0.9, -0.62, 1.75))
 
 @cache
 def detector(kind: str) -> Detector:
-    return Detector(replace(room(), frame_rate=RATE), [kind] * 4, FEW_HEIGHTS, BODY)
+    return detector_of(replace(room(), frame_rate=RATE), kind)
 
 
 def show(kind: str, standing: Floats) -> list[ViewEvidence]:

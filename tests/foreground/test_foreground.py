@@ -125,18 +125,6 @@ def test_people_take_no_mode_from_the_background() -> None:
     assert model.likelihood(room()).max() < 0.02
 
 
-def test_light_that_changes_at_once_or_slowly_is_a_gain() -> None:
-    scene = np.random.default_rng(5).integers(40, 160, (24, 24, 3)).astype(np.uint8)
-    model = Mixture((24, 24), 10.0)
-    for _ in range(5):
-        model.learn(scene)
-    for gain in (1.0, 0.6, 1.5, *np.linspace(1.5, 0.7, 20)):
-        light = gain * np.array([1.0, 0.95, 1.05])
-        empty = np.clip(np.round(scene * light), 0, 255).astype(np.uint8)
-        assert model.likelihood(empty).max() < 0.05
-        assert model.likelihood(with_person(empty, (5, 5, 5)))[6, 6] > 0.95
-
-
 def test_the_gain_holds_where_people_cover_more_than_half() -> None:
     rng = np.random.default_rng(6)
     background = rng.integers(50, 150, (40, 40, 3)).astype(np.float32)

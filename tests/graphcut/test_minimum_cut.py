@@ -4,6 +4,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from scipy.sparse.csgraph import maximum_flow
 
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
-from stseg.graphcut.cut import Cut, minimum_cut, reduce
+from stseg.graphcut.cut import minimum_cut, reduce
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.sign_sets import LABEL_ONE, UNDECIDED
 from stseg.graphcut.solvers import SOLVERS, Solver, find_solver
@@ -247,16 +248,11 @@ def test_cuts_in_two_threads_at_once_agree() -> None:
 
 @pytest.mark.skipif(INTERPRETED, reason="too large for plain Python")
 def test_real_windows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    energies: list[GridEnergy] = []
-
-    def kept(energy: GridEnergy) -> Cut:
-        energies.append(energy)
-        return minimum_cut(energy)
-
-    monkeypatch.setitem(SOLVERS, "stseg", Solver(kept, sparse_cut))
+    cuts = Mock(side_effect=minimum_cut)
+    monkeypatch.setitem(SOLVERS, "stseg", Solver(cuts, sparse_cut))
     assert track(write_recording(tmp_path), tmp_path / "run.h5", "--frames", "0:10") == 0
-    assert energies
-    for energy in energies:
+    assert cuts.called
+    for (energy,), _ in cuts.call_args_list:
         expected = SOLVERS["pymaxflow"].grid(energy).occupied
         assert expected.any()
         np.testing.assert_array_equal(minimum_cut(energy).occupied, expected)

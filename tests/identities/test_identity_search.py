@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_identities import crossings, greatest_score, score
+from refusals import refused
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
@@ -26,7 +27,7 @@ from stseg.identities.search.constraints import Constraints
 from stseg.identities.search.costs import crossing, crossings_of
 from stseg.identities.search.extension import Alternatives
 from stseg.identities.search.hypotheses import Hypotheses, Pasts
-from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.runs import Run, read_run
 from stseg.records.tables import APPEARANCE
 from stseg.tracking.row_groups import isolated_tracklets
 
@@ -283,18 +284,22 @@ def test_who_is_no_person_binds_nothing() -> None:
 # The command
 
 
+def solved(run: Path, output: Path, *answers: str) -> Run:
+    """The run that these answers make of another."""
+    table = output.with_suffix(".csv")
+    table.write_text("\n".join(["action,frame,id,other,name", *answers, ""]))
+    correct(run, table, output=output)
+    return read_run(output)
+
+
 def test_a_run_is_solved_again(undisturbed: Path, tmp_path: Path) -> None:
     """Without answers nothing changes; a swap exchanges tracks and labels, and names follow; the rest stays."""
     run = read_run(undisturbed)
     assert len(run.committed) >= len(run.trajectory) - 5
-    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nkeep,20,1,,\n")
-    correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "same.h5")
-    same = read_run(tmp_path / "same.h5")
+    same = solved(undisturbed, tmp_path / "same.h5", "keep,20,1,,")
     for name in ("trajectory", "tracks", "boxes"):
         np.testing.assert_array_equal(getattr(same, name), getattr(run, name))
-    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\nname,,2,,Bo\ndelete,,3,,\n")
-    correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "new.h5")
-    new = read_run(tmp_path / "new.h5")
+    new = solved(undisturbed, tmp_path / "new.h5", "swap,20,1,2,", "name,,2,,Bo", "delete,,3,,")
     assert set(new.tracks["id"].tolist()) == {1, 2}
     assert new.names == {2: "Bo"}
     for frame in (2, 37):
@@ -313,32 +318,24 @@ def test_a_run_is_solved_again(undisturbed: Path, tmp_path: Path) -> None:
 
 def test_a_second_correction_keeps_earlier_answers(undisturbed: Path, tmp_path: Path) -> None:
     """Two corrections one after the other are both at once; an old one holds, whatever a later one says."""
-    answers = tmp_path / "a.csv"
-    given = ("swap,20,1,2,\n", "delete,,3,,\n")
-    for text, source, result in ((given[0], undisturbed, "one.h5"), (given[1], tmp_path / "one.h5", "two.h5")):
-        answers.write_text(f"action,frame,id,other,name\n{text}")
-        correct(source, answers, output=tmp_path / result)
-    answers.write_text(f"action,frame,id,other,name\n{''.join(given)}")
-    correct(undisturbed, answers, output=tmp_path / "both.h5")
-    two, both = (read_run(tmp_path / f"{name}.h5") for name in ("two", "both"))
+    one = tmp_path / "one.h5"
+    solved(undisturbed, one, "swap,20,1,2,")
+    two = solved(one, tmp_path / "two.h5", "delete,,3,,")
+    both = solved(undisturbed, tmp_path / "both.h5", "swap,20,1,2,", "delete,,3,,")
     np.testing.assert_array_equal(two.trajectory, both.trajectory)
     assert sorted(two.answers.tolist()) == sorted(both.answers.tolist())
-    answers.write_text("action,frame,id,other,name\nswap,20,1,2,\n")
-    with pytest.raises(InputError, match="contradicts others"):
-        correct(tmp_path / "one.h5", answers, output=tmp_path / "back.h5")
+    refused(InputError, "contradicts others", solved, one, tmp_path / "back.h5", "swap,20,1,2,")
 
 
 def test_rows_that_are_not_there_are_refused(undisturbed: Path, tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\n")
-    correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "new.h5")
-    with h5py.File(tmp_path / "new.h5", "r+") as file:
+    new = tmp_path / "new.h5"
+    solved(undisturbed, new, "swap,20,1,2,")
+    with h5py.File(new, "r+") as file:
         file["answers"][0] = (10**6, 10**6 + 1, 1)
-    with pytest.raises(FormatError, match="/answers: found row 1000001"):
-        correct(tmp_path / "new.h5", tmp_path / "a.csv", output=tmp_path / "more.h5")
+    refused(FormatError, "/answers: found row 1000001", solved, new, tmp_path / "more.h5", "swap,20,1,2,")
 
 
 def test_answers_that_cannot_all_be_true_are_refused(undisturbed: Path, tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\nkeep,20,1,2,\n")
-    with pytest.raises(InputError, match="contradicts others"):
-        correct(undisturbed, tmp_path / "a.csv", output=tmp_path / "new.h5")
-    assert not (tmp_path / "new.h5").exists()
+    new = tmp_path / "new.h5"
+    refused(InputError, "contradicts others", solved, undisturbed, new, "swap,20,1,2,", "keep,20,1,2,")
+    assert not new.exists()

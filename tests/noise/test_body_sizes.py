@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, corner_cameras, evidence_of, expecting, likelihoods, people, room
+from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, expecting, likelihoods, people, room
 from scipy.special import expit
 from strategies import numbers
 
@@ -14,7 +14,6 @@ from stseg.arrays import Flags, Floats, Singles
 from stseg.bodies.outlines import outlines
 from stseg.bodies.pillars import SILHOUETTE, WIDTH
 from stseg.bodies.views import BACKGROUND_WEIGHT, BODY_WEIGHT, PixelView
-from stseg.detection.detector import Detector
 from stseg.detection.search.body_sizes import body_sizes
 from stseg.detection.search.refine import EvidenceAssignment, RefinedPlaces
 from stseg.records.candidates import Candidates
@@ -144,7 +143,7 @@ def test_the_head_closes() -> None:
 
 def tall_and_short(kind: str) -> tuple[Floats, Sizes]:
     standing = people((-0.9, 0.4, 1.58), (0.6, -0.5, 1.86), (0.9, 0.9, 1.7))
-    frame_pass = Detector(room(), [kind] * 4, FEW_HEIGHTS, BODY)
+    frame_pass = detector_of(room(), kind)
     found = frame_pass.explain(evidence_of(kind, room().cameras, standing), None).people
     order = [int(np.hypot(*(found.ground - place[:2]).T).argmin()) for place in standing]
     assert sorted(order) == [0, 1, 2]
@@ -162,7 +161,7 @@ def test_heights_are_found(kind: str) -> None:
 def test_who_is_known_keeps_their_height() -> None:
     """A walker's own height is the prior of the next frame's; the frame's own measurement stays free of it."""
     rig, standing = room(), people((0.2, 0.1, 1.7))
-    frame_pass = Detector(rig, ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    frame_pass = detector_of(rig, "pixels")
     expected = expecting((0.2, 0.1, 1.82))
     expected = replace(expected, sizes=replace(expected.sizes, height_variance=np.full(1, 0.01**2)))
     seen = likelihoods(rig.cameras, standing)

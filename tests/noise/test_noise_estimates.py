@@ -9,21 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, corner_cameras, expecting, found, likelihoods, people, rig_of, room
+from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, expecting, found, likelihoods, people, rig_of, room
 from scipy.ndimage import maximum_filter
 
 from stseg.arrays import Boxes, Floats, Singles, ViewEvidence
-from stseg.bodies.box_fit import (
-    EDGE_GRAIN,
-    EFFECTIVE_OBSERVATIONS,
-    LOWER_EDGE_BELOW,
-    PRIOR_NOISE,
-    SCORE_KNOTS,
-    TOLERANCE,
-    WIDTH_OFFSET,
-    BoxNoise,
-    half_square,
-)
+from stseg.bodies import box_fit
+from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, WIDTH_OFFSET
 from stseg.bodies.views import ViewObservation
 from stseg.config import BodyConfig, Config, DetectionConfig, ErrorRateConfig
 from stseg.detection.detector import Detector
@@ -52,9 +43,9 @@ def test_tolerance_of_boxes_follows_their_score() -> None:
 def test_what_is_sharper_says_more(scores: list[float]) -> None:
     score = np.array(scores)
     tolerance, belief = PRIOR_NOISE.of(score)
-    sharper, more = BoxNoise(PRIOR_NOISE.spread / 2).of(score)
+    sharper, more = box_fit.BoxNoise(PRIOR_NOISE.spread / 2).of(score)
     np.testing.assert_allclose(sharper, tolerance / 2)
-    np.testing.assert_allclose(more - belief, 4 * EFFECTIVE_OBSERVATIONS * np.log(2))
+    np.testing.assert_allclose(more - belief, 4 * box_fit.EFFECTIVE_OBSERVATIONS * np.log(2))
 
 
 def test_noise_begins_at_the_prior_and_forgets() -> None:
@@ -70,7 +61,7 @@ def test_noise_begins_at_the_prior_and_forgets() -> None:
 
 def taught(sharpening: BoxNoiseEstimate, spread: float, score: float, frames: int) -> None:
     """Boxes of three people in four views, edges off by so much of the height; every fourth ends far above the feet."""
-    rng, frame_pass = np.random.default_rng(3), Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
+    rng, frame_pass = np.random.default_rng(3), detector_of(room(), "boxes")
     for _ in range(frames):
         seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6), (0.6, 0.8)), spread, score, rng)
         sharpening.learn(frame_pass.explain(seen, None), frame_pass.views, frame_pass.observe(seen))
@@ -82,7 +73,7 @@ def shaken_boxes(
     found = []
     for view in detector.views:
         bodies = view.table.boxes_of(standing[:, :2], standing[:, 2])
-        tall = bodies[:, 3] - bodies[:, 1] + EDGE_GRAIN[: LOWER_EDGE_BELOW + 1, None]
+        tall = bodies[:, 3] - bodies[:, 1] + box_fit.EDGE_GRAIN[: box_fit.LOWER_EDGE_BELOW + 1, None]
         middle, wide, head, foot = rng.normal(0, spread, (4, len(bodies))) * tall
         left, right = bodies[:, 0] + middle - wide / 2, bodies[:, 2] + middle + wide / 2
         top, bottom = bodies[:, 1] + head, bodies[:, 3] + foot
@@ -134,17 +125,17 @@ def test_only_knots_beside_a_score_learn_of_it() -> None:
     sharpening = BoxNoiseEstimate(RATE, CONFIG)
     taught(sharpening, 0.02, 0.7, 10)
     changed = ~np.isclose(sharpening.noise.spread, PRIOR_NOISE.spread).all(1)
-    np.testing.assert_array_equal(changed, np.isin(SCORE_KNOTS, (0.6, 0.8)))
+    np.testing.assert_array_equal(changed, np.isin(box_fit.SCORE_KNOTS, (0.6, 0.8)))
 
 
 def test_a_boxs_distance_is_measured_by_its_own_tolerance() -> None:
     body, off = np.array([40.0, 10.0, 60.0, 60.0]), np.array([42.0, 12.0, 62.0, 63.0])
-    tight, loose = (half_square(body, off, factor * TOLERANCE, 128.0, 96.0) for factor in (1, 2))
+    tight, loose = (box_fit.half_square(body, off, factor * TOLERANCE, 128.0, 96.0) for factor in (1, 2))
     assert tight == pytest.approx(4 * loose)
 
 
 def test_each_session_begins_with_the_first_guess() -> None:
-    frame_pass = Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
+    frame_pass = detector_of(room(), "boxes")
     seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6)), 0.02, 1.0, np.random.default_rng(0))
     learned = frame_pass.new_estimates()
     frame_pass.explain_next(learned, 0, seen, None)
@@ -283,7 +274,7 @@ def seen(standing: Floats, eaten: int) -> list[ViewEvidence]:
 def learned_rims(
     standing: Floats, views: Sequence[ViewEvidence], frames: int = 10, evidence: float = 20.0
 ) -> RimEstimate:
-    asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    asked = detector_of(room(), "pixels")
     rims, here = asked.new_estimates().rims, replace(found(standing, evidence=evidence), height=standing[:, 2])
     observations = asked.observe(views)
     for _ in range(frames):
@@ -346,7 +337,7 @@ def test_who_overlaps_or_is_doubted_teaches_nothing(standing: Floats, evidence: 
 
 def test_learned_rims_raise_evidence_in_eaten_silhouettes() -> None:
     standing = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
-    asked, evidence = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY), []
+    asked, evidence = detector_of(room(), "pixels"), []
     first = asked.new_estimates()
     for known in (first, replace(first, rims=learned_rims(APART, seen(APART, 1)))):
         explained = asked.explain_next(known, 0, seen(standing, 1), expecting(*standing))

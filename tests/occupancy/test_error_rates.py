@@ -9,12 +9,11 @@ import pytest
 import reference_error_rates as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, corner_cameras, evidence_of, likelihoods, no_boxes, people, rig_of
+from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, likelihoods, no_boxes, people, rig_of
 
 from stseg.arrays import Flags, Floats, Ints, ViewEvidence
 from stseg.bodies.pillars import inside_bodies
 from stseg.config import ErrorRateConfig, OccupancyConfig
-from stseg.detection.detector import Detector
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
@@ -174,7 +173,7 @@ def frame(kind: str, lots: int) -> tuple[list[ViewEvidence], Explanation]:
     if kind == "pixels":
         clean = likelihoods(RIG.cameras, STANDING)
         seen = [np.where(rng.random(m.shape) < 0.1, 1 - m, m).astype(np.float32) for m in clean]
-    return seen, Detector(RIG, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
+    return seen, detector_of(RIG, kind).explain(seen, None)
 
 
 def occupancy(kind: str) -> Occupancy:

@@ -8,20 +8,7 @@ import pytest
 import reference_core as reference
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scenes import (
-    BODY,
-    FEW_HEIGHTS,
-    boxes,
-    corner_cameras,
-    evidence_of,
-    found,
-    likelihoods,
-    looking,
-    no_boxes,
-    people,
-    rig_of,
-    room,
-)
+from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, detector_of, evidence_of, found, looking, people, rig_of
 from strategies import numbers, rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
@@ -29,7 +16,6 @@ from stseg.bodies.box_fit import TOLERANCE
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable
 from stseg.config import OccupancyConfig
-from stseg.detection.detector import Detector
 from stseg.geometry import Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
@@ -283,8 +269,8 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
     standing = people((-1.6, 0.3), (1.4, -1.6))
     seen = evidence_of(kind, rig.cameras, standing)
     if kind == "pixels":
-        seen = [view * (view > 0.5) for view in likelihoods(rig.cameras, standing)]
-    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
+        seen = [np.where(view > 0.5, view, np.float32(0)) for view in map(np.asarray, seen)]
+    explanation = detector_of(rig, kind).explain(seen, None)
     occupancy = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY)
     some, every = occupancy.new_error_rates(), occupancy.new_error_rates()
     sparse = occupancy.fuse_and_learn(some, seen, explanation)
@@ -352,8 +338,9 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS, BODY)
     explanation = explained(rig, people((0.0, 0.0)))
     half = replace(explanation.people, visibility=np.array([[0.5]]))
-    whole_says = occupancy.fuse([no_boxes()], explanation).dense()
-    half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half)).dense()
+    nothing = evidence_of("boxes", rig.cameras, people())
+    whole_says = occupancy.fuse(nothing, explanation).dense()
+    half_says = occupancy.fuse(nothing, replace(explanation, people=half)).dense()
     near_person = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
     assert (whole_says[0][near_person] < -CONFIG.effective_observations).all()
     np.testing.assert_allclose(half_says[0][near_person], whole_says[0][near_person] / 2, rtol=1e-5)
@@ -362,10 +349,10 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
-    rig = room()
+    rig = rig_of(corner_cameras())
     standing = people((-0.8, 0.3), (0.9, -0.6))
     seen = evidence_of(kind, rig.cameras, standing)
-    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
+    explanation = detector_of(rig, kind).explain(seen, None)
     fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(seen, explanation).dense()
     away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
     assert fused.shape == rig.grid.shape
@@ -373,7 +360,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     assert (fused[:, away > 0.6] < 0).all()
     # A volume from nobody's evidence holds nobody.
     empty = evidence_of(kind, rig.cameras, people())
-    nobody = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(empty, None)
+    nobody = detector_of(rig, kind).explain(empty, None)
     assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody).dense() < PRIOR).all()
 
 

@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recordings import compiled_only, track, write_recording
-from scenes import BODY, FEW_HEIGHTS, evidence_of, people, room
+from scenes import detector_of, evidence_of, people, room
 
 from stseg.arrays import Bytes, Floats
-from stseg.detection.detector import Detector
 from stseg.geometry import Rig
 from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.runfile.runs import read_run
@@ -35,7 +34,7 @@ def moved(rig: Rig, view: int, pixels: float) -> Rig:
 def residuals(rig: Rig, kind: str, standing: Floats) -> Floats:
     """Residual of each view of a rig, of people as the room's own cameras show them."""
     views = evidence_of(kind, room().cameras, standing)
-    return Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(views, None).residual
+    return detector_of(rig, kind).explain(views, None).residual
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])

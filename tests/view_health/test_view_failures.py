@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, evidence_of, expecting, likelihoods, looking, no_boxes, people, rig_of, room
+from scenes import BODY, detector_of, evidence_of, expecting, likelihoods, looking, no_boxes, people, rig_of, room
 
 from stseg import Tracker
 from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence
@@ -41,7 +41,7 @@ def test_informedness_by_its_formula(seed: int, number: int) -> None:
 
 def session(kind: str, views: int = 4) -> tuple[Detector, Estimates]:
     rig = replace(room(), frame_rate=RATE, cameras=room().cameras[:views])
-    asked = Detector(rig, [kind] * views, FEW_HEIGHTS, BODY)
+    asked = detector_of(rig, kind)
     return asked, asked.new_estimates()
 
 
@@ -96,7 +96,7 @@ def test_a_view_that_never_showed_people_does_not_fail() -> None:
 def test_a_view_that_never_showed_people_fails_beside_four(others: int, failing: bool) -> None:
     corner, *more = room().cameras
     rig = rig_of([corner, *more, looking("beside", (0.0, -3.6, 2.6))][: others + 1])
-    asked = Detector(replace(rig, frame_rate=RATE), ["pixels"] * len(rig.cameras), FEW_HEIGHTS, BODY)
+    asked = detector_of(replace(rig, frame_rate=RATE), "pixels")
     learned, seen = asked.new_estimates(), list(likelihoods(rig.cameras, STANDING))
     half = [np.where(np.arange(view.shape[1]) % 2, view, 0.0).astype(np.float32) for view in map(np.asarray, seen)]
     explained(asked, learned, [half[0], *seen[1:]], 50)
@@ -179,7 +179,7 @@ class Watch:
 
     def __init__(self, kind: str, views: int = 4) -> None:
         rig = replace(room(), cameras=room().cameras[:views])
-        self.detector = Detector(rig, [kind] * views, FEW_HEIGHTS, BODY)
+        self.detector = detector_of(rig, kind)
         self.found = KnockedViews(views, BODY, RATE, ErrorRateConfig())
 
     def compare(self, seen: Sequence[ViewEvidence], frames: int, tracks: Floats = STANDING) -> list[bool]:
