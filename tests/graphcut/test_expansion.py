@@ -173,12 +173,13 @@ def test_the_minimum_is_that_of_all_labellings(seed: int, nodes: int, edges: int
         assert found.gap == 0
 
 
-def test_the_gap_bounds_what_local_search_misses(monkeypatch: pytest.MonkeyPatch) -> None:
+@settings(max_examples=30)
+@given(seed=st.integers(0, 9999))
+def test_the_gap_bounds_what_local_search_misses(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(qpbo, "COMPONENT_LIMIT", 0)
-    for seed in range(30):
-        energy = quadratic_energy(seed, 10, 30, -5, 5)
-        found = minimise(energy)
-        assert 0 <= energy.of(found.labels) - least(energy) <= found.gap
+    energy = quadratic_energy(seed, 10, 30, -5, 5)
+    found = minimise(energy)
+    assert 0 <= energy.of(found.labels) - least(energy) <= found.gap
 
 
 def test_no_variables() -> None:
