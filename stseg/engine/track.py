@@ -152,7 +152,7 @@ def track_recording(
     people = NO_KNOWN_PEOPLE if known is None else read_known(known, config)
     request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
-    request |= {"--known": "nobody" if known is None else digest(people)}
+    request |= {"--known": "nothing" if known is None else digest(people)}
     work = WorkFolder(output, request)
     work.require_output(overwrite, Inputs(recording_files(recording), [known]))
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):

@@ -26,6 +26,8 @@ PLACE_RESOLUTION = 0.1
 """s: resolution of places in one frame, metres (standard deviation)."""
 LEAST_HEIGHT_RATIO = -4.0
 """Least log-ratio of a height, nats: people stoop and sit."""
+EXISTENCE_DECAY = 4.0
+"""Decay rate of the existence log-odds while a person is undetected, nats per second."""
 
 
 @dataclass(frozen=True)

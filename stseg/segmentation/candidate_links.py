@@ -15,12 +15,10 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, MotionConfig
 from stseg.kernels.accelerate import kernel
-from stseg.records.predicted_tracks import LEAST_HEIGHT_RATIO, PLACE_RESOLUTION
+from stseg.records.predicted_tracks import EXISTENCE_DECAY, LEAST_HEIGHT_RATIO, PLACE_RESOLUTION
 from stseg.records.sizes import log_heavy_tailed
 from stseg.segmentation.label_energy import PLACE_GATE
 
-_ABSENCE = 4.0
-"""Cost of a frame without a candidate inside a path, nats per second."""
 _LINKS_PER_CANDIDATE = 32
 """Links of a candidate for which there is room at first."""
 Links = tuple[Ints, Ints, Floats]
@@ -70,7 +68,7 @@ class LinkModel:
         spread = found.covariance[start] + found.covariance[end] + noise[:, None, None] * np.eye(2)
         square = np.einsum("ei,eij,ej->e", off, np.linalg.inv(spread), off)
         place = np.log(PLACE_RESOLUTION**2 / np.sqrt(np.linalg.det(spread))) - 0.5 * square
-        absence = _ABSENCE * (seconds - 1 / self.frame_rate)
+        absence = EXISTENCE_DECAY * (seconds - 1 / self.frame_rate)
         bonus = place - self.prior_log_odds + self._height_ratio(found, start, end) - absence
         bonus = bonus + birth[end] + death[start]
         kept = (bonus > 0) & (square < PLACE_GATE)

@@ -41,8 +41,8 @@ _TOTAL_GAIN = 1.0
 """Least gain of the best shift of a knocked view by all people."""
 _STEADY_GAIN = 0.1
 """Mean gain of a shift below which a view is not knocked."""
-_OTHER_VIEWS = 2
-"""Least number of other views that are not."""
+OTHER_VIEWS = 2
+"""Least number of other views by which a view is judged."""
 _USUAL_TIME, _USUAL_FRAMES = 1.0, 5.0
 """Least time with people by which the usual share of a view is estimated, seconds, and frames at least."""
 _RECENT_MEMORY, _RECENT_FRAMES = 0.25, 3.0
@@ -119,7 +119,7 @@ class KnockedViews:
         """Count the gain of the best shift by a number of people (view,), and decide which views are knocked."""
         steady = measured & (gains < _STEADY_GAIN * number)
         shifted = falls & (gains >= np.maximum(_TOTAL_GAIN, _FALL * number))
-        begins = shifted & (steady.sum() >= _OTHER_VIEWS) & (shifted.sum() == 1)
+        begins = shifted & (steady.sum() >= OTHER_VIEWS) & (shifted.sum() == 1)
         self.recent.forget()
         self.recent.sums[begins] = 0.0
         self.recent.add(np.column_stack([number, gains]))

@@ -37,7 +37,7 @@ from stseg.config import BodyConfig, ErrorRateConfig
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation
 from stseg.records.predicted_tracks import PredictedTracks
-from stseg.view_health.knocked_views import KnockedViews
+from stseg.view_health.knocked_views import OTHER_VIEWS, KnockedViews
 
 ViewInput = TypeVar("ViewInput")
 """Evidence or observation of a view."""
@@ -56,8 +56,6 @@ _USUAL_TIME = 2.0
 """Least time of one person by which the usual informedness of a view is estimated, seconds."""
 _USUAL_WEIGHT = 0.1
 """Weight of the usual informedness in that of now, seconds of one person."""
-_OTHER_VIEWS = 2
-"""Least number of other views that show a person who counts."""
 _COMPARED_VIEWS, _COMPARED_TIME = 4, 3.0
 """Least number of other views by which a view fails that was never better, and time with people before, seconds."""
 _SUPPORT = 1.0
@@ -138,7 +136,7 @@ class ViewFailures:
             if observation is None:
                 continue
             certain = (people.evidence - evidence[k] >= self._config.minimum_evidence) & (
-                support - supports[k] >= _OTHER_VIEWS
+                support - supports[k] >= OTHER_VIEWS
             )
             self._count(k, *informedness(explanation.pixel_assignment[k], certain, view.foreground(observation)))
         begins = self.failing & ~self.excluded

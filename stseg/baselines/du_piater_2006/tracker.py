@@ -17,13 +17,13 @@ from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.distances import distances
 from stseg.records.border import Border
-from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.predicted_tracks import EXISTENCE_DECAY, PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign
-from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS, EXISTENCE_DECAY
+from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS
 
 _METHODS = {"messages": propagate, "condensation": condense}
 """Propagation of stars from frame to frame."""

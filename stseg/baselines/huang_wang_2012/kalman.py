@@ -21,13 +21,13 @@ from stseg.baselines.huang_wang_2012.kalman_filters import (
 )
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.predicted_tracks import EXISTENCE_DECAY, PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign
-from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS, EXISTENCE_DECAY
+from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS
 
 
 class KalmanTracker(FramewiseTracker):

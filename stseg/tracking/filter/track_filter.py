@@ -17,7 +17,7 @@ from stseg.config import Config, MotionConfig
 from stseg.geometry.distances import distances
 from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.people import People
-from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.predicted_tracks import EXISTENCE_DECAY, PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.tracking.filter.motion_model import augmented_noise, augmented_transition
 
@@ -33,8 +33,6 @@ EXCLUSION_RADIUS = 0.5
 """Radius around existing tracks within which no track begins and no place is interpolated, metres."""
 _UNMEASURED_SHARE = 0.6
 """Share of the population's variance from which on a frame has not measured a size."""
-EXISTENCE_DECAY = 4.0
-"""Decay rate of the existence log-odds while a track is undetected, nats per second."""
 
 
 class Measurement(NamedTuple):
