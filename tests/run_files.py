@@ -9,6 +9,7 @@ from stseg.arrays import Ints, Labels, Rows, Singles
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.layout import LOG_ODDS_STEP, ghost_type
+from stseg.io.runfile.run_writer import packed_volume
 from stseg.io.runfile.runs import RunWriter
 from stseg.records.tables import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
 
@@ -64,11 +65,18 @@ def small_ghosts() -> Rows:
     return table
 
 
+def append_frames(writer: RunWriter, frames: Ints, log_odds: Singles, label: Labels) -> None:
+    """Append volumes (time, plane, y, x)."""
+    packed = [packed_volume(*volume) for volume in zip(log_odds, label, strict=True)]
+    writer.append_packed_log_odds(frames, [one for one, _ in packed])
+    writer.append_packed_labels([other for _, other in packed])
+
+
 def fill(writer: RunWriter) -> None:
     """Everything but the end, in two windows of three frames."""
     log_odds, label = small_volume()
     for index, part in enumerate((slice(0, 3), slice(3, 6))):
-        writer.append_frames(FRAMES[part], log_odds[part], label[part])
+        append_frames(writer, FRAMES[part], log_odds[part], label[part])
         bounds = (index, FRAMES[part][0], FRAMES[part][-1] + 1, FRAMES[part][0], FRAMES[part][-1] + 1)
         writer.append("windows", np.array([(*bounds, 12345, 1e-6, 7)], WINDOW))
         rates = [(FRAMES[part][-1], view, 0.2, 0.05 / (index + 1), 0.4, 0.25, 0.02) for view in range(2)]
@@ -87,7 +95,7 @@ def write_run(
     shape = recording.rig.grid.shape
     with RunWriter(path, recording, np.full(shape, views, np.uint8), config, overwrite=True) as writer:
         volume = np.zeros((len(frames), *shape), np.float32)
-        writer.append_frames(frames, volume, volume.astype(np.int32))
+        append_frames(writer, frames, volume, volume.astype(np.int32))
         writer.append("trajectory", trajectory)
         writer.finish(Tracks(trajectory).summary())
     return path

@@ -72,29 +72,10 @@ class RunWriter:
         if not self._finished:
             self._disk.discard(self._close)
 
-    def append_frames(self, frames: Ints, log_odds: Singles, label: Labels) -> None:
-        """Append the volume of the next frames.
-
-        Parameters
-        ----------
-        frames : int64 (time,)
-            Their numbers in the recording, rising.
-        log_odds : float32 (time, plane, y, x)
-            Nats, NaN where no view sees the cell; kept to `layout.LOG_ODDS_STEP`.
-        label : int32 (time, plane, y, x)
-            Track ids, 0 for background.
-        """
-        shape = (len(frames), *self._views.shape)
-        if log_odds.shape != shape or label.shape != shape:
-            raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
-        packed = [packed_volume(*volume) for volume in zip(log_odds, label, strict=True)]
-        self.append_packed_log_odds(frames, [one for one, _ in packed])
-        self.append_packed_labels([other for _, other in packed])
-
     def append_packed_log_odds(self, frames: Ints, log_odds: Sequence[PackedFrame]) -> None:
-        """Append the log-odds of the next frames, as of `append_frames`; their labels may come later.
+        """Append the log-odds of the next frames, one each by `packed_volume`; their labels may come later.
 
-        They are packed for this layout and grid, one for each frame.
+        The numbers of frames, int64 (time,), rise.
         """
         self._require_later(frames)
         with self._disk.step():
@@ -105,7 +86,7 @@ class RunWriter:
             self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
 
     def append_packed_labels(self, label: Sequence[PackedFrame]) -> None:
-        """Append the labels of the next frames that have none, packed for this layout and grid."""
+        """Append the labels of the next frames that have none, one each by `packed_volume`."""
         if self._labels + len(label) > self._frames:
             raise ValueError(f"labels of {self._labels + len(label)} frames for {self._frames}")
         with self._disk.step():
@@ -176,7 +157,11 @@ class RunWriter:
 
 
 def packed_volume(log_odds: Singles, label: Labels) -> tuple[PackedFrame, PackedFrame]:
-    """The log-odds and labels (plane, y, x) of a frame as `RunWriter.append_frames` packs them."""
+    """The log-odds and labels (plane, y, x) of a frame on a grid, packed for the layout of run files.
+
+    Log-odds are in nats, NaN where no view sees the cell, and kept to `layout.LOG_ODDS_STEP`; labels are track ids, and
+    0 for background.
+    """
     finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
     coarse = np.round(finite / np.float32(layout.LOG_ODDS_STEP)) * np.float32(layout.LOG_ODDS_STEP)
     whole = coarse.astype(layout.LOG_ODDS.dtype, copy=False), label.astype(layout.LABEL.dtype, copy=False)

@@ -1,7 +1,5 @@
 """Run files: contents, atomic writing, and errors for broken files."""
 
-from __future__ import annotations
-
 import gc
 import os
 import re
@@ -22,6 +20,7 @@ from refusals import refused
 from run_files import (
     CONFIG,
     FRAMES,
+    append_frames,
     fill,
     small_ghosts,
     small_recording,
@@ -137,7 +136,7 @@ def test_log_odds_are_kept_in_steps_and_finite(tmp_path: Path) -> None:
     log_odds, label = small_volume(1)
     log_odds[0, 0, 0, 1:5] = np.inf, -1e6, 0.3, -0.33
     with writer_at(tmp_path / "far.h5") as writer:
-        writer.append_frames(FRAMES[:1], log_odds, label)
+        append_frames(writer, FRAMES[:1], log_odds, label)
         writer.finish(Tracks(trajectory_of()).summary())
     kept = read_run(tmp_path / "far.h5").read_frame(10)[0][0, 0, :5]
     np.testing.assert_array_equal(kept, [np.nan, 65536, -65536, 10 / 32, -11 / 32])
@@ -157,9 +156,8 @@ def test_many_small_appends_make_one_table(tmp_path: Path) -> None:
 def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
     log_odds, label = small_volume(2)
     with writer_at(tmp_path / "slip.h5") as writer:
-        writer.append_frames(np.array([4, 6]), log_odds, label)
-        refused(ValueError, "after frame 6", writer.append_frames, np.array([6, 7]), log_odds, label)
-        refused(ValueError, "volumes", writer.append_frames, np.array([8]), log_odds, label)
+        append_frames(writer, np.array([4, 6]), log_odds, label)
+        refused(ValueError, "after frame 6", append_frames, writer, np.array([6, 7]), log_odds, label)
         refused(ValueError, "labels of 3 frames for 2", writer.append_packed_labels, [packed_frame(label[0])])
         refused(ValueError, "rows", writer.append, "ghosts", np.zeros(1, layout.ghost_type(3)))
     other = tmp_path / "other.h5"
@@ -221,7 +219,7 @@ def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: py
     """Once at each line of the code that makes a part, writes to it and publishes it, and while the system makes it."""
     reached, interrupted = list[tuple[str, int]](), False
 
-    def interrupt(frame: FrameType, event: str, _: object) -> TraceFunction | None:
+    def interrupt(frame: FrameType, event: str, _: object) -> "TraceFunction | None":
         nonlocal interrupted
         name = Path(frame.f_code.co_filename).name
         if name not in ("part_file.py", "whole_files.py"):
@@ -238,7 +236,7 @@ def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: py
             signal.raise_signal(signal.SIGINT)
         return descriptor
 
-    def write(trace: TraceFunction | None) -> None:
+    def write(trace: "TraceFunction | None") -> None:
         sys.settrace(trace)
         try:
             with writer_at(tmp_path / "night.h5", overwrite=True) as writer:

@@ -146,7 +146,7 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> Path:
     events = run_files.table_of(EVENT, kind=b"merge", reason=b"their cells touch", frame=np.arange(5000))
     with RunWriter(path, recording, np.ones((3, 4, 6), np.uint8), run_files.CONFIG, overwrite=False) as writer:
         for first in range(0, count, len(volume)):
-            writer.append_frames(np.arange(first, first + len(volume)), volume, label)
+            run_files.append_frames(writer, np.arange(first, first + len(volume)), volume, label)
         writer.append("trajectory", table)
         writer.append("ghosts", ghosts)
         writer.append("events", events)
