@@ -7,7 +7,7 @@ import numpy as np
 import reference_core as reference
 
 from stseg.arrays import Floats, Ints
-from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters, no_rows
+from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters
 from stseg.detection.score.scoring import set_score
 from stseg.detection.search.best_set import ENUMERATION_LIMIT, GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import COMPILED
@@ -115,11 +115,3 @@ def in_rooms(frame: CraftedFrame, size: int) -> CraftedFrame:
         track_gain[np.arange(len(room)), track * rooms + room] = gains
     ground = frame.ground + 10.0 * room[:, None]
     return replace(frame, boxes=boxes, pixels=pixels, ground=ground, track_gain=track_gain)
-
-
-def two_births(boxes: BoxEvidence | None, pixels: PixelEvidence) -> CraftedFrame:
-    """Two candidates far apart, without tracks or costs of births; None for no view with boxes."""
-    if boxes is None:
-        boxes = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), no_rows(), np.zeros((0, 2)), np.ones(2))
-    ground = np.array([[0.0, 0.0], [2.0, 0.0]])
-    return CraftedFrame(boxes, pixels, np.zeros(2), ground, np.zeros(2), np.zeros((2, 0)), np.ones(2))

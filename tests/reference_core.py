@@ -41,9 +41,6 @@ Edge = tuple[int, int, int]
 """Two cells of a flattened volume, and the capacity between them."""
 
 
-# Boxes and pillars
-
-
 def repulsion(distance: float, parameters: ScoreParameters) -> float:
     """Cost of a pair: excluded within the hard core, linear up to the distance at which bodies touch."""
     if distance < parameters.hard_core:
@@ -86,9 +83,6 @@ def cover(bodies: Floats, distance: Floats, width: float, height: float, i: int,
         return 0.0
     trunk = bodies[k] + 0.1 * (bodies[k, 2] - bodies[k, 0]) * np.array([1, 0, -1, 0])
     return min(overlap(seen, trunk) / overlap(seen, seen), 1.0)
-
-
-# The score of a set
 
 
 def set_score(members: Sequence[int], problem: DetectionProblem) -> float:
@@ -180,9 +174,6 @@ def subsets(number: int) -> Iterator[tuple[int, ...]]:
         yield from combinations(range(number), size)
 
 
-# Occupancy
-
-
 def clutter(likelihood: Singles, side: int) -> float:
     """Root mean square of the standard deviations of square cells, those cut by the border included."""
     height, width = likelihood.shape
@@ -250,9 +241,6 @@ def left_to_cell(
         visible += 1
         total += 0.0 if elsewhere else float(likelihood[v, u])
     return visible / len(pixels), total / max(visible, 1)
-
-
-# The cut
 
 
 def neighbours(energy: GridEnergy) -> list[Edge]:

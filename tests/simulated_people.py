@@ -94,9 +94,6 @@ def runs(draw: st.DrawFn, most: int) -> Rows:
     return np.delete(rows, sorted(unseen))
 
 
-# Boxes
-
-
 SIZE = (640, 480)
 _ROUND = np.linspace(0, 2 * np.pi, 13)[:-1]
 _BODY = np.array([(z, r) for z, r in ((0.0, 0.13), (0.3, 0.15), (0.5, 0.21), (0.8, 0.23), (0.9, 0.12), (1.0, 0.08))])
@@ -167,9 +164,6 @@ def exchanged(rig: Rig, first: int, second: int) -> Rig:
     cameras[first] = Camera(a.name, a.size, b.ground, b.vertical, b.lens)
     cameras[second] = Camera(b.name, b.size, a.ground, a.vertical, a.lens)
     return replace(rig, cameras=tuple(cameras))
-
-
-# Endpoints of silhouettes
 
 
 TOE = 0.1

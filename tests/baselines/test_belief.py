@@ -124,9 +124,6 @@ def test_a_view_shows_those_in_its_image() -> None:
     assert not VIEWS[0].shows(np.array([-3.4, -3.3]), 1.7, 0.5)
 
 
-# Colours
-
-
 def test_bins_of_colours() -> None:
     """Colours on the border of two bins may fall in either."""
     for colour in np.ndindex(8, 8, 8):
@@ -178,9 +175,6 @@ def test_who_stands_in_front() -> None:
     boxes = in_front(np.array([[0.5, 0.5], [0.0, 0.0], [1.0, -1.0]]), np.full(3, 1.7), VIEWS[0])
     np.testing.assert_allclose(boxes[0], VIEWS[0].boxes(np.zeros((1, 2)), 1.7))
     assert [len(b) for b in boxes] == [1, 0, 0]
-
-
-# Messages
 
 
 @settings(max_examples=15)
@@ -243,9 +237,6 @@ def test_without_any_view_the_ground_goes_on_as_foretold() -> None:
     moved = rounds.settled()
     np.testing.assert_allclose(moved.ground.mean, [0.1, 0.0], atol=0.1)
     assert moved.views == (None,) * 4
-
-
-# The tracker
 
 
 QUICK = replace(CONFIG, belief=FEW)

@@ -52,9 +52,6 @@ GROUPS = st.integers(0, 2**32 - 1).map(
 """Three people anywhere in the room."""
 
 
-# Colours (eq. 1)
-
-
 def test_normalised_colours_forget_the_light() -> None:
     dark, bright = np.array([[[20, 40, 60]]], np.uint8), np.array([[[60, 120, 180]]], np.uint8)
     a, b = normalised(dark)[0, 0].astype(int), normalised(bright)[0, 0].astype(int)
@@ -85,9 +82,6 @@ def test_histograms_share_out_their_samples() -> None:
     assert shares[0] == pytest.approx(2 / 3)
     assert bins_of(colour).tolist() == [0, 0, int(np.prod(BINS)) - 1]
     assert histogram(colour[:0]).sum() == 0
-
-
-# Bodies and segmentation (eqs 2 to 4)
 
 
 @given(GROUPS)
@@ -143,9 +137,6 @@ def test_what_is_open_is_in_front() -> None:
     assert (lone[behind] >= 0).all()
 
 
-# Axes and where they meet (eq. 5)
-
-
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=25))
 @settings(max_examples=50)
 def test_the_middle_of_the_shortest_half_is_the_least_median(distances: list[float]) -> None:
@@ -186,9 +177,6 @@ def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
     for k in range(2):
         np.testing.assert_allclose(ground[k], plain.meeting(axes[:, k], HYPOTHESIS_WEIGHT, before[k]), atol=1e-9)
     assert farthest == pytest.approx(np.hypot(*(ground - before).T).max())
-
-
-# Particles (eqs 6 and 7)
 
 
 @given(GROUPS)
@@ -237,9 +225,6 @@ def test_appearances_fill_and_are_renewed_slowly() -> None:
     share = (later.samples[1, :, 0] == 10).mean()
     assert 0.2 < share < 0.6
     assert full.samples[1, 0, 0] == 200  # nothing is changed in place
-
-
-# The tracker
 
 
 def passing(config: Config, frames: int) -> Rows:

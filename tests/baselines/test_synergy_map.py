@@ -32,9 +32,6 @@ def noise(seed: int, views: int = 4) -> list[Singles]:
     return list((np.rint(level) / TOP_LEVEL).astype(np.float32))
 
 
-# Summed-area tables
-
-
 @settings(max_examples=30)
 @given(st.integers(1, 30), st.integers(1, 30), st.integers(0, 999))
 def test_means_over_footprints_by_definition(width: int, height: int, seed: int) -> None:
@@ -66,9 +63,6 @@ def test_what_is_no_likelihood_becomes_one(value: float) -> None:
     maps = [np.full((96, 128), value, np.float32)] * 4
     fused = Localiser(COARSE, "footprint").synergy(maps, np.ones(4), 0.05)
     assert np.isfinite(fused).all()
-
-
-# Fusion
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -150,9 +144,6 @@ def test_far_views_do_not_blur() -> None:
     np.testing.assert_array_equal(point, footprint)
 
 
-# Any reference plane
-
-
 def box_mask(camera: Camera, low: Floats, high: Floats) -> Singles:
     """The silhouette of a box of the world."""
     corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3)
@@ -192,9 +183,6 @@ def test_ten_planes_unless_somebody_says_otherwise() -> None:
     for planes in (1, 3, 25):
         rig = rig_of(corner_cameras()[:1], cell=1.0, planes=planes)
         assert Localiser(rig).synergy(noise(1, 1), np.ones(1), 0.05).shape == (planes, 4, 4)
-
-
-# Coverage
 
 
 def fine_views(views: int) -> Localiser:

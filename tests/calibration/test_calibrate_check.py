@@ -207,9 +207,6 @@ def test_a_real_rig_is_right_until_a_camera_is_moved(tmp_path: Path) -> None:
     assert [camera.view for camera in check.verdict.named] == [3]
 
 
-# The page
-
-
 SPEC = SceneSpec("clicked", 1, (6.0, 6.0), 1.0, cameras=2, size=(480, 360), seed=3, distortion=())
 CAMERAS = build_rig(SPEC).cameras
 PLACES = np.array([[-2.0, -1.0], [2.0, -2.0], [1.5, 1.5], [-1.0, 2.0], [0.0, 0.0], [0.5, -1.5]])

@@ -248,9 +248,6 @@ def test_points_are_read_as_they_stand(tmp_path: Path) -> None:
     assert second.place.tolist() == [[7, 8, 2.1]]
 
 
-# The lens
-
-
 LENS_SIZE, BOARD = (640, 480), (7, 5)
 MATRIX = np.array([[620.0, 0, 325.0], [0, 618.0, 236.0], [0, 0, 1]])
 DISTORTION = np.array([-0.18, 0.04, 0.0, 0.0, 0.0])

@@ -23,8 +23,6 @@ from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.tasks.overview import summarise_run
 
-# The command line
-
 
 def test_help_names_every_command_and_imports_none() -> None:
     program = (
@@ -87,9 +85,6 @@ def test_a_reader_that_has_seen_enough_is_no_error(run_path: Path) -> None:
         running.stdout.close()
         assert running.stderr.read() == b""
     assert running.returncode == 0
-
-
-# inspect
 
 
 def test_inspect_sums_up_a_run(run_path: Path) -> None:
@@ -165,23 +160,17 @@ def test_a_slice_needs_a_file_and_destroys_none(run_path: Path, tmp_path: Path, 
 
 
 def test_inspect_on_a_screen(run_path: Path, stdout: Command) -> None:
+    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
     screen = stdout("inspect", run_path)
     for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
         assert said in screen
     assert re.search(r"left +20\.0 +2\.5 +40\.0 +1 *\n", screen)  # of each view, how it errs and what it denies
 
 
-def test_inspect_counts_a_merge_and_its_split_as_one_encounter() -> None:
-    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
-
-
 def test_inspect_warns_of_an_empty_run(tmp_path: Path, stdout: Command) -> None:
     path = write_run(tmp_path / "silent.h5", small_recording(tmp_path), trajectory_of(), np.array([0]), views=0)
     assert summarise_run(read_run(path)).warnings == ["no person was found", "no view sees any cell"]
     assert "warning: no person was found" in stdout("inspect", path)
-
-
-# export
 
 
 def test_export_to_csv_reads_back(run_path: Path, tmp_path: Path, stdout: Command) -> None:

@@ -3,6 +3,7 @@
 import re
 import tomllib
 from dataclasses import dataclass, field, fields, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any, Literal
 
@@ -212,3 +213,31 @@ def test_the_command_prints_a_file_that_a_run_takes(tmp_path: Path, refusal: Com
     printed = stdout("config", "--set", "body.height_mean=1.2", "--expert")
     assert read(tmp_path / "c.toml", printed) == read_config(None, ["body.height_mean=1.2"])
     assert "did you mean heights?" in refusal("config", "--set", "body.height=1")
+
+
+OUT_OF_RANGE = """
+    belief.particles=1 belief.iterations=0 belief.outlier_rate=1 belief.neutral_distance=0 belief.colour_weight=0
+    belief.seed=-1
+    foreground.chromatic.chromatic_sd=0
+    foreground.codebook.codewords=0 foreground.codebook.brightest_highlight=1 foreground.codebook.recurrence=1
+    foreground.codebook.absence=0 foreground.codebook.channel_sd=0 foreground.codebook.memory=0
+    foreground.mixture.modes=0 foreground.mixture.smoothing_radius=-1 foreground.mixture.memory=0
+    foreground.mixture.shadow_prior=1 foreground.mixture.background_weight=nan
+    illumination.changed_share=1 illumination.change_time=0 illumination.blind_time=-1
+    kalman.gate_probability=1 kalman.patience=-1
+    labels.contrast_slope=0 labels.position_noise=0 labels.samples=0 labels.outlier_rate=1
+    live.correction_interval=-1 live.correction_memory=0
+    particles.particles=0 particles.velocity_spread=0 particles.seed=-1 particles.patience=-1
+    proposals.unseen_rate=0 proposals.body_sizes=1 proposals.kernel_radius=0
+    segmentation.neighbours=26 segmentation.smoothness=17
+    segments.length=0 segments.background_period=0
+    tracking.return_probability=0.3
+"""
+
+
+@pytest.mark.parametrize("wrong", OUT_OF_RANGE.split())
+def test_constants_of_stages_out_of_range_are_named(wrong: str) -> None:
+    place, value = wrong.split("=")
+    *sections, key = place.split(".")
+    config = reduce(getattr, sections, Config())
+    refused(ConfigError, key, replace, config, **{key: type(getattr(config, key))(value)})

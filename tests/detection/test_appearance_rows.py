@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 from scenes import boxes, corner_cameras, found, mask, people, rig_of
 
 from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence
@@ -177,11 +178,9 @@ def test_files_that_are_no_features_are_refused(tmp_path: Path, features: Floats
 def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
     wanted = source(tmp_path, np.zeros((4, 2)))
     (tmp_path / "looks.npy").write_bytes(b"no array")
-    with pytest.raises(FormatError, match=r"looks\.npy"):
-        open_stream(wanted, CAMERAS[0])
+    refused(FormatError, r"looks\.npy", open_stream, wanted, CAMERAS[0])
     (tmp_path / "looks.npy").unlink()
-    with pytest.raises(SourceError, match=r"looks\.npy"):
-        open_stream(wanted, CAMERAS[0])
+    refused(SourceError, r"looks\.npy", open_stream, wanted, CAMERAS[0])
 
 
 def test_axes_are_those_of_the_greatest_variance() -> None:
@@ -206,6 +205,5 @@ def test_cameras_whose_features_differ_in_length_are_refused(tmp_path: Path) -> 
     axes = appearance_axes(three)
     assert axes is not None
     assert axes.shape == (2, 2)
-    with pytest.raises(FormatError, match="3 numbers a box"):
-        appearance_axes(Recording(tmp_path / "rig.toml", RIG, tuple(sources)))
+    refused(FormatError, "3 numbers a box", appearance_axes, Recording(tmp_path / "rig.toml", RIG, tuple(sources)))
     assert appearance_axes(Recording(tmp_path / "rig.toml", RIG, three.sources[3:] * 4)) is None

@@ -132,9 +132,6 @@ def test_outlines_outside_the_image() -> None:
     np.testing.assert_array_equal(first, [-1, -1])
 
 
-# The scale of blobs
-
-
 CROWD = people((-1.2, -0.3, 1.75), (-0.2, 1.2, 1.6), (0.4, -1.1, 1.8))
 
 

@@ -85,9 +85,6 @@ def test_five_people(kind: str, cameras: int, scene: int) -> None:
     assert_these(frame_pass.explain(views, expecting(*standing + np.array([0.06, -0.05, 0]))), standing)
 
 
-# Over time
-
-
 def strollers(frame: int) -> Floats:
     """Two who walk side by side, north-east, through the rig of figure 4: their ghosts walk with them."""
     step = 0.05 * frame
@@ -189,9 +186,6 @@ def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
         assert len(chains) == 4
         who.add(int(chains[away.argmin()]))
     assert len(who) == 1
-
-
-# Unexplained pixels
 
 
 BACKGROUND = np.float32(-2.2)

@@ -28,7 +28,7 @@ SPREADS = st.tuples(numbers(0.05, 0.6), numbers(0.05, 0.6), numbers(-0.9, 0.9)).
     lambda s: np.array([[s[0] ** 2, s[0] * s[1] * s[2]], [s[0] * s[1] * s[2], s[1] ** 2]])
 )
 TRACKS = st.tuples(PLACES, SPREADS, numbers(1.4, 2.0), numbers(0.03, 0.12), numbers(-6, 1))
-CANDIDATES = st.tuples(PLACES, numbers(1.5, 1.9))
+CANDIDATES = st.tuples(PLACES, numbers(1.0, 2.0))
 
 
 def population(height: float) -> float:
@@ -74,16 +74,6 @@ def test_log_density_of_a_place_up_to_a_constant() -> None:
         np.testing.assert_allclose(log_density[k], by_hand[[[2, 1, 0], [0, 1, 2]][k]], atol=1e-9)
 
 
-def test_a_wrong_height_never_rules_a_track_out() -> None:
-    """A person who sits is still there; but the heights of two in one place differ."""
-    expected = expecting((0.0, 0.0, 1.9))
-    height = np.array([1.9, 1.7, 1.5, 1.0])
-    log_ratio = expected.track_log_ratio(np.zeros((4, 2)), height, BODY, CONFIG.prior_log_odds)[:, 0]
-    assert log_ratio[0] > log_ratio[1] + 4
-    assert log_ratio[0] - log_ratio.min() < 12
-    assert np.isfinite(log_ratio).all()
-
-
 def test_no_tracks() -> None:
     assert len(no_tracks()) == 0
     assert no_tracks().track_log_ratio(np.zeros((3, 2)), np.full(3, 1.7), BODY, CONFIG.prior_log_odds).shape == (3, 0)
@@ -104,16 +94,6 @@ def test_tracks_are_assigned_at_the_greatest_sum(people: int, tracks: int, seed:
     assert total == pytest.approx(sum(gain[pair] for pair in pairs))
     place = {k: a for a, k in pairs}
     assert member_of.tolist() == [*(place.get(k, -1) for k in range(tracks)), 77, 77]
-
-
-def test_a_track_is_of_one_candidate() -> None:
-    log_ratio, birth, member_of = np.array([[3.0], [2.5]]), np.array([5.0, 5.0]), np.zeros(1, np.int64)
-    assert track_score(np.array([0, 1]), 2, log_ratio, birth, member_of) == 8.0
-    assert member_of.tolist() == [0]
-    assert track_score(np.array([1, 0]), 1, log_ratio, birth, member_of) == 7.5
-    assert member_of.tolist() == [0]
-    assert track_score(np.array([0, 1]), 2, log_ratio - 9, birth, member_of) == 0.0
-    assert member_of.tolist() == [-1]  # a track that does not help leaves a birth
 
 
 def open_ground(grid: Grid) -> Rig:

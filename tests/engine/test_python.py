@@ -23,7 +23,6 @@ from stseg.commands.main import main
 from stseg.engine.offline.calls import called_beside, called_here
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
-from stseg.kernels.accelerate import COMPILED
 from stseg.tasks.forecast import Forecast
 from stseg.tasks.warnings import crowd_warnings
 
@@ -163,10 +162,11 @@ def test_the_volume_is_read_as_it_is_indexed(tmp_path: Path) -> None:
     np.testing.assert_array_equal(run.volume_dataset().label.values, np.asarray(run.volume.label))
 
 
-def test_every_public_name_is_there() -> None:
+def test_every_public_name_is_there_and_no_other() -> None:
     assert {*stseg.__all__, "__version__"} == set(dir(stseg))
     for name in stseg.__all__:
         assert getattr(stseg, name).__name__ == name
+    refused(AttributeError, "nothing_of_that_name", getattr, stseg, "nothing_of_that_name")
 
 
 @pytest.fixture(scope="module")
@@ -206,10 +206,6 @@ def test_a_public_object_shows_itself_in_ten_lines(name: str, instances: dict[st
     assert not shown.startswith("<stseg")
 
 
-def test_an_unknown_name_is_an_attribute_error() -> None:
-    refused(AttributeError, "nothing_of_that_name", getattr, stseg, "nothing_of_that_name")
-
-
 def test_the_package_is_the_command() -> None:
     shown = subprocess.run([sys.executable, "-m", "stseg", "--version"], capture_output=True, text=True, check=True)
     assert shown.stdout.strip() == stseg.__version__
@@ -225,9 +221,11 @@ def _compiles() -> int:
     return int(numba.njit(lambda: 3)())
 
 
-def test_a_call_is_made_in_another_process() -> None:
+def test_a_call_is_made_in_another_process_and_its_error_passes() -> None:
     with called_beside(print, os.getpid) as result:
         assert result() != os.getpid()
+    with called_beside(print, FrameRange.parse, "none") as result:
+        refused(ConfigError, "--frames", result)
 
 
 def test_a_call_whose_process_dies_is_made_here() -> None:
@@ -243,12 +241,7 @@ def test_a_call_here_is_made_once_its_result_is_asked_for() -> None:
     assert made == [1]
 
 
-def test_an_error_passes_from_the_other_process() -> None:
-    with called_beside(print, FrameRange.parse, "none") as result:
-        refused(ConfigError, "--frames", result)
-
-
-@pytest.mark.skipif(not COMPILED, reason="kernels are not compiled")
+@compiled_only
 def test_what_the_other_process_compiles_is_noted() -> None:
     notes = list[str]()
     with called_beside(notes.append, _compiles) as result:

@@ -65,9 +65,6 @@ def in_shadow(share: float) -> tuple[float, float, float]:
     return FLOOR[0] * share, FLOOR[1] * share, FLOOR[2] * share
 
 
-# What every model promises
-
-
 @every_model
 def test_the_likelihood_is_a_posterior_with_the_given_prior(kind: type[Background]) -> None:
     model: Background = taught(kind, foreground_prior=0.2)
@@ -196,7 +193,8 @@ def test_a_copy_goes_on_bit_for_bit_and_by_itself(kind: type[Background]) -> Non
 def test_what_a_model_cannot_take_is_refused(kind: type[Background]) -> None:
     refused(SourceError, "learned nothing", new(kind).likelihood, room())
     refused(SourceError, "no frames", new(kind).learn_from, [])
-    refused(SourceError, "image", taught(kind).likelihood, room()[1:])
+    for image in (room()[1:], room()[:, :, 0], room().astype(np.float32)):
+        refused(SourceError, "image", taught(kind).likelihood, image)  # type: ignore[arg-type]
     refused(ConfigError, "frame_rate", kind, SIZE, 0.0)
 
 
@@ -209,9 +207,6 @@ def test_the_configuration_names_the_model() -> None:
         assert type(model).__name__.lower() == name
         assert model.config == getattr(config, name)
     assert isinstance(make_background(SIZE, RATE, config), Background)
-
-
-# The chromatic mixture
 
 
 @given(seed=st.integers(0, 10**6))
@@ -243,9 +238,6 @@ def test_a_dark_pixel_has_no_chromaticity_to_speak_of() -> None:
     for _ in range(20):
         dark.learn(room((7, 9, 4)))
     assert dark.likelihood(with_person(room((7, 9, 4)), (5, 6, 7)))[MIDDLE] < 0.1
-
-
-# The codebook
 
 
 def test_a_slight_highlight_is_softer_than_a_person() -> None:

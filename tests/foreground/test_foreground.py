@@ -16,7 +16,6 @@ from reference_foreground import FLOOR, SHIRT, near_modes, noisy, random_modes
 from refusals import refused
 
 from stseg.arrays import Boxes, Bytes, Floats
-from stseg.bodies.box_likelihood import body
 from stseg.config import ChromaticConfig
 from stseg.errors import InputError, SourceError
 from stseg.foreground import Mixture, MixtureConfig, box_likelihood, instance_boxes, mask_likelihood
@@ -60,9 +59,6 @@ def answer(model: Mixture, colour: tuple[float, float, float]) -> float:
     return float(deepcopy(model).likelihood(with_person(room(), colour))[6, 6])
 
 
-# What the likelihood means
-
-
 def test_likelihood_rises_with_the_distance_from_the_background() -> None:
     model = taught()
     answers = [answer(model, (110 + d, 140, 60)) for d in range(0, 100, 4)]
@@ -93,9 +89,6 @@ def test_single_noisy_pixels_are_outvoted_by_their_neighbours() -> None:
     image[6, 6] = SHIRT
     assert taught().likelihood(image)[6, 6] < 0.1
     assert taught(MixtureConfig(smoothing_radius=0)).likelihood(image)[6, 6] > 0.9
-
-
-# What is learned
 
 
 def test_learning_gives_every_empty_frame_the_same_weight() -> None:
@@ -134,9 +127,6 @@ def test_the_gain_holds_where_people_cover_more_than_half() -> None:
     np.testing.assert_allclose(gains, 1.3, rtol=0.01)
     dark = channel_gains(np.zeros_like(image), background)
     np.testing.assert_array_equal(dark, 1)
-
-
-# Kernels against their plain definitions
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -228,16 +218,6 @@ def test_the_commonest_colour_is_the_one_with_most_companions(seed: int, count: 
     np.testing.assert_allclose(variance, expected_variance, atol=1e-3)
 
 
-def test_images_of_another_size_or_kind_are_refused() -> None:
-    model = taught()
-    for image in (room(size=(11, 12)), room()[:, :, 0], room().astype(np.float32)):
-        with pytest.raises(SourceError, match="image"):
-            model.likelihood(image)  # type: ignore[arg-type]
-
-
-# Masks, boxes, instances
-
-
 def test_a_mask_is_read_as_likelihood() -> None:
     likelihood = mask_likelihood(np.array([[0, 51, 255]], np.uint8))
     assert likelihood.dtype == np.float32
@@ -263,17 +243,6 @@ def test_a_box_holds_a_soft_body_of_its_score() -> None:
     assert not likelihood[~inside].any()
 
 
-def test_boxes_unite_by_maximum_and_may_leave_the_image() -> None:
-    rows = [(-5.0, -10.0, 20.0, 40.0), (5.0, 5.0, 15.0, 60.0), (200.0, 5.0, 9.0, 9.0), (3.0, 3.0, 0.0, 9.0)]
-    score = [0.5, 0.9, 1.0, 1.0]
-    united = box_likelihood(boxes_of(*rows, score=score), (30, 40))
-    single = [box_likelihood(boxes_of(row, score=[s]), (30, 40)) for row, s in zip(rows, score, strict=True)]
-    np.testing.assert_array_equal(united, np.maximum.reduce(single))
-    assert united[0, 5] > 0
-    assert not single[2].any()
-    assert not single[3].any()
-
-
 @settings(max_examples=30)
 @given(seed=st.integers(0, 10**6), count=st.integers(0, 3), step=st.integers(1, 4))
 def test_the_box_map_is_its_definition(seed: int, count: int, step: int) -> None:
@@ -288,12 +257,6 @@ def test_boxes_that_are_no_boxes_are_refused() -> None:
     refused(InputError, "score", box_likelihood, boxes_of((0, 0, 1, 1), score=[1.5]), (4, 4))
     refused(InputError, "finite", box_likelihood, boxes_of((0, float("nan"), 1, 1)), (4, 4))
     refused(InputError, "step", box_likelihood, boxes_of((0, 0, 1, 1)), (4, 4), step=0)
-
-
-@given(across=st.floats(-1, 1), down=st.floats(0, 1))
-def test_a_body_is_symmetric_and_within_bounds(across: float, down: float) -> None:
-    assert 0 <= body(across, down) <= 1
-    assert body(across, down) == body(-across, down)
 
 
 @settings(max_examples=30)

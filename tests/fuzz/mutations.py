@@ -71,9 +71,6 @@ def _number(data: bytes, random: np.random.Generator) -> bytes:
 _MUTATIONS = (_flip, _set, _cut, _remove, _double, _insert, _number, _number)
 
 
-# HDF5
-
-
 _REALS = (np.nan, np.inf, -1e30, 1e30, 0.0, -1.0)
 _ATTRIBUTES: tuple[Any, ...] = (np.nan, -1, 1e308, "x" * 10_000, b"\xff", np.arange(9), "", 2**62, "\x1b[31m")
 

@@ -249,9 +249,6 @@ class TestRig:
         Rig("hall", 5.0, near, (camera,)).require_coverage()
 
 
-# Reduction
-
-
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
 
 

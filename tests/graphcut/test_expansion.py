@@ -146,9 +146,7 @@ def test_nothing_to_label() -> None:
     assert len(expand(LabelEnergy(np.zeros(1, np.int64), empty, empty, empty, empty, empty), empty)) == 0
     alone = LabelEnergy(np.zeros(4, np.int64), empty, empty, empty, empty, empty)
     assert expand(alone, np.zeros(3, np.int64)).tolist() == [0, 0, 0]
-
-
-# Roof duality
+    assert len(minimise(QuadraticEnergy(empty, empty, empty, empty)).labels) == 0
 
 
 def quadratic_energy(seed: int, nodes: int, edges: int, low: int, high: int) -> QuadraticEnergy:
@@ -180,8 +178,3 @@ def test_the_gap_bounds_what_local_search_misses(seed: int, monkeypatch: pytest.
     energy = quadratic_energy(seed, 10, 30, -5, 5)
     found = minimise(energy)
     assert 0 <= energy.of(found.labels) - least(energy) <= found.gap
-
-
-def test_no_variables() -> None:
-    none = np.zeros(0, np.int64)
-    assert len(minimise(QuadraticEnergy(none, none, none, none)).labels) == 0

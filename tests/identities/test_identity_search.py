@@ -170,9 +170,6 @@ def test_few_people_keep_the_prior() -> None:
     assert model.spread[0] == pytest.approx(0.8 * CONFIG.body.height_spread**2, rel=0.05)
 
 
-# Constraints
-
-
 def identities(rows: Rows, constraints: Constraints) -> Ints:
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
     problem = IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, constraints)
@@ -246,9 +243,6 @@ def test_constraints_of_nobody_change_nothing() -> None:
     np.testing.assert_array_equal(identities(rows, Constraints.of(told, [])), free)
 
 
-# Answers
-
-
 def bound(rows: Rows, *answers: Answer) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
     """Track and frame of both rows of what is the same, and of what is not."""
     found = answered_rows(rows, answers, RATE).constraints
@@ -279,9 +273,6 @@ def test_who_is_no_person_binds_nothing() -> None:
     assert told.deleted.tolist() == ((rows["id"] == 2) & (rows["frame"] >= 20)).tolist()
     assert len(told.constraints) == 1
     assert len(answered_rows(rows, [Answer("b", "swap", 1, 2, 20)], RATE).constraints) == 2
-
-
-# The command
 
 
 def solved(run: Path, output: Path, *answers: str) -> Run:

@@ -10,6 +10,7 @@ from unittest.mock import Mock
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from run_files import table_of
 from scenes import room
 
 from stseg.arrays import Rows
@@ -29,12 +30,9 @@ EXCHANGE = np.array([(50, 20, 50, 1, 2), (50, 20, 50, 2, 1)], CORRECTION)
 
 def walk(track: int, first: int, stop: int, y: float = 0.0, height: float = 1.7) -> Rows:
     """A walk along x at 1 m/s, which is at 0 in frame 50."""
-    rows = np.zeros(stop - first, TRAJECTORY)
-    rows["frame"], rows["id"] = np.arange(first, stop), track
+    rows = table_of(TRAJECTORY, frame=np.arange(first, stop), id=track, y=y, raw_y=y, height=height, width=0.42)
     rows["x"] = rows["raw_x"] = (rows["frame"] - 50) / RATE
-    rows["y"] = rows["raw_y"] = y
-    rows["xx"] = rows["yy"] = 0.03**2
-    rows["height"], rows["width"], rows["score"], rows["views"] = height, 0.42, 10.0, 4
+    rows["xx"], rows["yy"], rows["score"], rows["views"] = 0.03**2, 0.03**2, 10.0, 4
     return rows
 
 

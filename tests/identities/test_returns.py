@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 from run_files import write_small_run
 from simulated_people import BORDER, CONFIG, RATE, committed, rows_of, straight
 
@@ -111,9 +112,6 @@ def test_visits_are_in_the_order_of_time() -> None:
     assert len(pooled_visits(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2)))) == 0
 
 
-# Tracks
-
-
 def scene() -> tuple[Rows, Rows, Rows]:
     """Five people whose features differ; the first is away for ten seconds, and comes back as track 6."""
     frames = {k: range(400) for k in range(2, 6)} | {1: range(100), 6: range(180, 400)}
@@ -173,9 +171,6 @@ def test_who_came_back_can_be_split_where_they_came() -> None:
         assert len(set(whole(returning(0.99), answered.constraints).identity.tolist())) == 6
 
 
-# People of an earlier recording
-
-
 def coloured(people: dict[int, int], seed: int) -> tuple[Rows, Rows]:
     """Rows of some tracks, each of a person whose clothes are always the same, and what two cameras see of them."""
     rows = committed(rows_of({k: (straight(-4, 2 * k - 7, 0.02, 0), 1.7, range(240)) for k in people}, noise=0.0))
@@ -227,8 +222,7 @@ def test_a_run_file_tells_of_its_people_or_says_why_not(tmp_path: Path) -> None:
     path = write_small_run(tmp_path / "run.h5")
     with pytest.raises(ConfigError, match=r"--known: found that alone, expected tracking.return_probability below 1"):
         read_known(path, CONFIG)
-    with pytest.raises(FormatError, match=r"run.h5: /committed: found no rows"):
-        read_known(path, returning(0.99))
+    refused(FormatError, r"run.h5: /committed: found no rows", read_known, path, returning(0.99))
     before = np.zeros(2, KNOWN_PERSON)
     before["id"] = 2, 7
     with h5py.File(path, "r+") as file:
@@ -246,8 +240,6 @@ def test_a_run_file_tells_of_its_people_or_says_why_not(tmp_path: Path) -> None:
         with h5py.File(path, "r+") as file:
             before["id"] = ids
             file["known_people"][:] = before
-        with pytest.raises(FormatError, match=message):
-            read_known(path, returning(0.99))
+        refused(FormatError, message, read_known, path, returning(0.99))
     (tmp_path / "text.h5").write_text("not HDF5")
-    with pytest.raises(InputError, match=r"text\.h5"):
-        read_known(tmp_path / "text.h5", returning(0.99))
+    refused(InputError, r"text\.h5", read_known, tmp_path / "text.h5", returning(0.99))

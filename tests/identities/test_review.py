@@ -6,7 +6,8 @@ import h5py
 import numpy as np
 import pytest
 from browser import CHROMIUM, chromium
-from run_files import write_small_run
+from refusals import refused
+from run_files import table_of, write_small_run
 
 from stseg.arrays import Floats, Rows
 from stseg.commands.correct import correct
@@ -24,10 +25,8 @@ BORDER = np.array([[-5.0, -5.0], [5.0, 5.0]])
 
 
 def walk(identity: int, first: int, x: Floats, y: float, height: float, score: float = 9.0) -> Rows:
-    rows = np.zeros(len(x), TRAJECTORY)
-    rows["frame"], rows["id"], rows["x"], rows["y"] = first + np.arange(len(x)), identity, x, y
-    rows["height"], rows["score"] = height, score
-    return rows
+    frame = first + np.arange(len(x))
+    return table_of(TRAJECTORY, frame=frame, id=identity, x=x, y=y, height=height, score=score)
 
 
 def encounter(first: float, second: float) -> Rows:
@@ -110,9 +109,6 @@ def test_without_tracks_nothing_is_doubted() -> None:
     assert find_doubts(np.zeros(0, TRAJECTORY), Tracks(np.zeros(0, TRAJECTORY)).summary(), 10.0, BORDER) == []
 
 
-# Corrections
-
-
 def tracks(*spans: tuple[int, int]) -> Rows:
     rows = np.zeros(len(spans), TRACK)
     for k, (first, last) in enumerate(spans):
@@ -161,8 +157,7 @@ def test_a_swap_where_one_track_ends_hands_its_identity_over() -> None:
     ],
 )
 def test_answers_that_cannot_be_are_named(answer: Answer, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        solve_corrections(TWO, [answer])
+    refused(InputError, message, solve_corrections, TWO, [answer])
 
 
 def test_an_end_is_joined_once() -> None:
@@ -200,15 +195,13 @@ def test_the_command_leaves_the_run_and_its_volume_alone(tmp_path: Path) -> None
 def test_malformed_answers_are_one_line(tmp_path: Path, text: str, message: str) -> None:
     run = write_small_run(tmp_path / "run.h5")
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(FormatError, match=message):
-        correct(run, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    refused(FormatError, message, correct, run, tmp_path / "a.csv", output=tmp_path / "new.h5")
     assert not (tmp_path / "new.h5").exists()
 
 
 def test_names_are_read_once_each(tmp_path: Path) -> None:
     (tmp_path / "n.csv").write_text("id,name\n3,Ann\n3,Bo\n")
-    with pytest.raises(FormatError, match="line 3: found id 3 twice"):
-        read_names(tmp_path / "n.csv")
+    refused(FormatError, "line 3: found id 3 twice", read_names, tmp_path / "n.csv")
 
 
 def test_names_go_through_exports_and_report(tmp_path: Path) -> None:

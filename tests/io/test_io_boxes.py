@@ -37,9 +37,9 @@ def test_csv_columns_come_in_any_order_and_others_are_ignored(tmp_path: Path) ->
     assert table.at(2).pixel.tolist() == [[10, 20, 30, 40]]
 
 
-def test_boxes_without_scores_are_believed(tmp_path: Path) -> None:
-    table = read(tmp_path, "\ufeffframe, left, top, width, height\n0, 1, 2, 3, 4\n")
-    assert table.at(0).score.tolist() == [1]
+@pytest.mark.parametrize("text", ["\ufeffframe, left, top, width, height\n0, 1, 2, 3, 4\n", "0,7,1,2,3,4\n"])
+def test_boxes_without_scores_are_believed(tmp_path: Path, text: str) -> None:
+    assert read(tmp_path, text).at(0).score.tolist() == [1]
 
 
 @pytest.mark.parametrize("separator", [",", " ", ", ", "  "])
@@ -51,10 +51,6 @@ def test_motchallenge_lines(tmp_path: Path, separator: str) -> None:
     assert table.at(0).score.tolist() == [1]
     assert table.at(1).pixel.tolist() == [[5.5, 6, 7, 8]]
     assert table.at(1).score.tolist() == [0.25]
-
-
-def test_motchallenge_without_confidence(tmp_path: Path) -> None:
-    assert read(tmp_path, "0,7,1,2,3,4\n").at(0).score.tolist() == [1]
 
 
 def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:

@@ -260,9 +260,6 @@ def test_wildtrack_s_own_files_have_the_same_members(run: Run, path: Path) -> No
     assert {type(value) for value in person["views"][0].values()} == {int}
 
 
-# movement
-
-
 def test_movement_s_poses_in_xarray(run: Run, path: Path) -> None:
     FORMATS["movement"].write(path, run)
     with xarray.open_dataset(path, engine="h5netcdf") as data:

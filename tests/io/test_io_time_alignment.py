@@ -168,31 +168,26 @@ def test_frames_are_counted(cameras: list[Floats], notes: list[str]) -> None:
 def test_stamps_that_vary_are_believed() -> None:
     clock = decided((video(), WAVERING), (video(), every(1.0, 61)))
     assert clock.frame_at_tick[1] is None
-    assert clock.frame_at_tick[0] is not None
-    assert np.flatnonzero(clock.frame_at_tick[0] < 0).tolist() == [30]
-    assert len(clock.notes) == 1
-    assert clock.notes[0].startswith("cam1: the time stamps vary")
+    assert np.flatnonzero(np.asarray(clock.frame_at_tick[0]) < 0).tolist() == [30]
+    assert [note[:26] for note in clock.notes] == ["cam1: the time stamps vary"]
 
 
 @pytest.mark.parametrize("other", [every(1.0, 60), WAVERING])
 def test_another_rate_counts_if_a_camera_keeps_the_rigs(other: Floats) -> None:
     clock = decided((video(), other), (video(), every(0.5, 120)))
-    assert clock.frame_at_tick[1] is not None
-    assert clock.frame_at_tick[1][:60].tolist() == list(range(0, 120, 2))
+    assert np.asarray(clock.frame_at_tick[1])[:60].tolist() == list(range(0, 120, 2))
     assert any("20 frames per second, the rig 10; each tick shows the nearest frame" in n for n in clock.notes)
 
 
 def test_clocks_that_drift_apart_are_held_together() -> None:
     clock = decided((video(), every(1.0, 2000)), (video(), every(1.001, 1998)))
-    assert clock.frame_at_tick[1] is not None
-    assert (clock.frame_at_tick[1][:3].tolist(), clock.frame_at_tick[1][1900]) == ([0, 1, 2], 1898)
+    assert np.asarray(clock.frame_at_tick[1])[[0, 1, 2, 1900]].tolist() == [0, 1, 2, 1898]
 
 
 def test_the_rig_may_say_what_is_believed() -> None:
     assert decided((video(clock="count"), WAVERING)) == TimeAlignment((None,), ())
     clock = decided((video(clock="stamps"), every(0.5, 60)))
-    assert clock.frame_at_tick[0] is not None
-    assert clock.frame_at_tick[0].tolist() == list(range(0, 60, 2))
+    assert np.asarray(clock.frame_at_tick[0]).tolist() == list(range(0, 60, 2))
     assert clock.notes == ()
     said = "camera cam1, clock: found files without time stamps that rise"
     refused(SourceError, said, decided, (video(clock="stamps"), np.full(3, np.nan)))

@@ -66,12 +66,9 @@ def test_truth_keeps_its_flags(path: Path) -> None:
     refused(OutputError, "did not make", write_tracks_csv, path, trajectory([]), overwrite=True)
 
 
-def test_columns_may_stand_in_any_order_among_others(path: Path) -> None:
+def test_columns_may_stand_in_any_order_and_flags_be_empty(path: Path) -> None:
     path.write_text("\ufeffnote, y ,x,id,frame\n\nhello,2,1,7,12.0\n", encoding="utf-8")
     assert read_tracks_csv(path).tolist() == [(12, 7, 1.0, 2.0, 0)]
-
-
-def test_an_empty_flag_is_no_flag(path: Path) -> None:
     path.write_text("frame,id,x,y,flag\n0,1,0,0,\n0,2,0,0,3\n")
     assert read_tracks_csv(path)["flag"].tolist() == [0, 3]
 
@@ -109,14 +106,11 @@ def test_what_is_wrong_is_named_with_its_place(path: Path, text: str, message: s
     refused(FormatError, f"tracks.csv: {message}", read_tracks_csv, path)
 
 
-def test_files_that_are_no_text_are_refused(path: Path) -> None:
+def test_files_that_cannot_be_read_or_written_are_named(path: Path) -> None:
     path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
     refused(FormatError, "not text", read_tracks_csv, path)
     refused(FormatError, "No such file", read_tracks_csv, path.with_name("nowhere.csv"))
     refused(FormatError, "directory", read_tracks_csv, path.parent)
-
-
-def test_a_place_that_cannot_be_written_is_named(path: Path) -> None:
     refused(OutputError, "nowhere", write_tracks_csv, path.parent / "nowhere" / "tracks.csv", trajectory([]))
 
 

@@ -43,9 +43,6 @@ def run_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_small_run(tmp_path_factory.mktemp("run") / "night.h5")
 
 
-# silx view
-
-
 def test_silx_opens_the_file_at_the_volume(run_path: Path) -> None:
     with silx.io.open(str(run_path)) as file:
         shown = silx.io.nxdata.get_default(file)
@@ -69,9 +66,6 @@ def test_silx_reads_a_frame_and_a_table_by_their_address(run_path: Path) -> None
     np.testing.assert_allclose(frame, small_volume()[0][2], rtol=1e-3)
     table = silx.io.get_data(f"silx:{run_path}?path=/trajectory")
     np.testing.assert_array_equal(table["x"], small_trajectory()["x"])
-
-
-# xarray
 
 
 def test_xarray_has_named_axes_with_units_and_selects_by_them(run_path: Path) -> None:
@@ -101,9 +95,6 @@ def test_pedpy_takes_trajectory_and_area_from_the_run_file(run_path: Path) -> No
     np.testing.assert_allclose(density["density"], [1 / 0.24] * 3 + [2 / 0.24] * 3)
 
 
-# pandas
-
-
 def test_tables_as_data_frames(run_path: Path) -> None:
     run = read_run(run_path)
     table = run.data_frame("trajectory")
@@ -122,9 +113,6 @@ def test_tables_as_data_frames(run_path: Path) -> None:
 def test_pandas_is_asked_for_where_it_is_missing(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     refused(ConfigError, r"pip install 'stseg\[pandas\]'", read_run(run_path).data_frame, "tracks")
-
-
-# napari
 
 
 def test_napari_s_layers_are_in_seconds_and_metres(run_path: Path) -> None:
@@ -193,11 +181,8 @@ def label() -> np.ndarray:
     return np.where(chosen.random(SHAPE) < 0.2, chosen.integers(-(2**31), 2**31, SHAPE), 0).astype(np.int32)
 
 
-def test_labels_come_back(label: np.ndarray) -> None:
+def test_labels_come_back_here_and_by_hdf5(label: np.ndarray) -> None:
     assert np.array_equal(unpacked_label(packed_frame(label), SHAPE), label)
-
-
-def test_hdf5_unpacks_the_same(label: np.ndarray) -> None:
     with h5py.File("any.h5", "w", driver="core", backing_store=False) as file:
         dataset = file.create_dataset("label", SHAPE, np.int32, chunks=SHAPE, compression="gzip", shuffle=True)
         dataset.id.write_direct_chunk((0, 0, 0), packed_frame(label).data)

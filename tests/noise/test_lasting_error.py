@@ -1,7 +1,5 @@
 """Errors that last: what is found of them, and what the rows of a person hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

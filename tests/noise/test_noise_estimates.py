@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, expecting, found, likelihoods, people, rig_of, room
 from scipy.ndimage import maximum_filter
 
@@ -128,12 +129,6 @@ def test_only_knots_beside_a_score_learn_of_it() -> None:
     np.testing.assert_array_equal(changed, np.isin(box_fit.SCORE_KNOTS, (0.6, 0.8)))
 
 
-def test_a_boxs_distance_is_measured_by_its_own_tolerance() -> None:
-    body, off = np.array([40.0, 10.0, 60.0, 60.0]), np.array([42.0, 12.0, 62.0, 63.0])
-    tight, loose = (box_fit.half_square(body, off, factor * TOLERANCE, 128.0, 96.0) for factor in (1, 2))
-    assert tight == pytest.approx(4 * loose)
-
-
 def test_each_session_begins_with_the_first_guess() -> None:
     frame_pass = detector_of(room(), "boxes")
     seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6)), 0.02, 1.0, np.random.default_rng(0))
@@ -141,9 +136,6 @@ def test_each_session_begins_with_the_first_guess() -> None:
     frame_pass.explain_next(learned, 0, seen, None)
     assert (learned.box_noise.offsets.sums[:, 0] > 0).any()
     np.testing.assert_allclose(frame_pass.new_estimates().box_noise.noise.spread, PRIOR_NOISE.spread)
-
-
-# The population
 
 
 POPULATION_RATE = 8.0
@@ -234,8 +226,7 @@ def test_the_rigs_bodies_are_kept_in_its_file() -> None:
 )
 def test_the_rigs_bodies_are_checked(line: str, key: str) -> None:
     text = format_rig(recording(BodyPrior()), Path("rig.toml")) + f"\n[body]\n{line}\n"
-    with pytest.raises(RigError, match=key):
-        parse_rig(text, Path("rig.toml"))
+    refused(RigError, key, parse_rig, text, Path("rig.toml"))
 
 
 def test_the_configuration_precedes_the_rig_as_a_prior() -> None:
@@ -250,11 +241,7 @@ def test_the_configuration_precedes_the_rig_as_a_prior() -> None:
     assert min(body.heights) < 0.6 < max(body.heights) < 0.8
     configured = with_body_of(dogs, Config(body=BodyConfig(height_mean=0.9, heights=(0.8, 1.0)))).body
     assert (configured.height_mean, configured.heights, configured.width_mean) == (0.9, (0.8, 1.0), 0.5)
-    with pytest.raises(ConfigError, match="height_mean"):
-        with_body_of(dogs, Config(body=BodyConfig(height_spread=0.4)))
-
-
-# Rims
+    refused(ConfigError, "height_mean", with_body_of, dogs, Config(body=BodyConfig(height_spread=0.4)))
 
 
 APART = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75))

@@ -18,7 +18,6 @@ from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.occupancy.error_rate_estimate import (
-    CLUTTER,
     MISS,
     NEAR_CLUTTER,
     ErrorRateEstimate,
@@ -111,19 +110,6 @@ def test_soft_likelihoods_sharpen_the_rates() -> None:
         rates.append(level.rates[0].miss)
     assert (np.diff(rates) < 0).all()
     assert rates[-1] < 0.1
-
-
-def test_whom_the_pass_missed_is_no_clutter() -> None:
-    shape, near = (1, 1, 2), np.full((1, 2), -1)
-    body = np.full(shape, TOP_LEVEL, np.int16)
-    body[..., 1] = 0
-    shown = reference.Shown((body,) * 4, (np.ones(shape, np.float32),) * 4)
-    args = near, np.zeros(shape, bool), np.zeros(0, bool), [FIRST] * 4, 1.0
-    errors, seen = teach(0, shown, *args)
-    assert errors[CLUTTER] < 0.05
-    assert seen[CLUTTER] == pytest.approx(1.0, abs=0.05)  # the other cell
-    alone = reference.Shown((body, *(np.zeros(shape, np.int16),) * 3), shown.share)
-    assert teach(0, alone, *args)[0][CLUTTER] > 0.9
 
 
 def test_the_first_guess_holds_at_first_and_comes_back() -> None:

@@ -54,24 +54,10 @@ def noise(seed: int) -> list[Singles]:
     return [(rng.random((96, 128)) ** (k + 1)).astype(np.float32) for k in range(4)]
 
 
-# Clutter
-
-
 @given(st.integers(1, 20), st.integers(1, 20), st.integers(1, 25), st.integers(0, 99))
 def test_clutter_by_definition(height: int, width: int, side: int, seed: int) -> None:
     likelihood = np.random.default_rng(seed).random((height, width)).astype(np.float32)
     assert clutter(likelihood, side) == pytest.approx(reference.clutter(likelihood, side), abs=1e-7)
-
-
-def test_clutter_measures_unrest_within_cells() -> None:
-    assert clutter(flat(0.7), 24) == pytest.approx(0.0, abs=1e-7)
-    chequered = flat(0.0)
-    chequered[::2, ::2] = chequered[1::2, 1::2] = 1.0
-    assert clutter(chequered, 24) == pytest.approx(0.5)
-    halves = flat(0.0)
-    halves[:, 64:] = 1.0
-    assert clutter(halves, 32) == pytest.approx(0.0, abs=1e-7)  # the edge runs between the cells
-    assert clutter(halves, 48) > 0.2
 
 
 @given(st.lists(st.just(np.nan) | numbers(0, 0.5), max_size=6), numbers(0, 0.5))
@@ -85,9 +71,6 @@ def test_weights_fall_with_clutter_down_to_the_median(others: list[float], clutt
     share = weights[awake] * np.maximum(clutters[awake], floor)
     np.testing.assert_allclose(share, share[0])
     assert clutter_weights(np.array([np.nan, np.nan])).tolist() == [0.0, 0.0]
-
-
-# Sampling
 
 
 KINDS: list[SamplingKind] = ["point", "footprint"]
@@ -145,9 +128,6 @@ def test_cells_outside_the_polygon_are_not_seen() -> None:
     assert (views[0][rig.grid.inside()] == 4).all()
 
 
-# Likelihood per plane
-
-
 @settings(max_examples=15)
 @given(st.integers(0, 999))
 def test_likelihood_per_plane_by_definition(seed: int) -> None:
@@ -198,9 +178,6 @@ def test_a_box_says_as_much_as_its_match_is_worth(near_person: int, clutter: flo
     np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
     erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))
     np.testing.assert_allclose(erring, match, atol=0.2 * clutter)
-
-
-# Fusion
 
 
 LEVEL = 0.01

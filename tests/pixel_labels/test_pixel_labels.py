@@ -164,9 +164,6 @@ def test_the_energy_of_the_paper_with_pruned_labels(seed: int) -> None:
     assert best_allowed == pytest.approx(best_of_all, abs=0.03)
 
 
-# Labels
-
-
 def test_one_person_is_their_silhouette() -> None:
     camera, everybody = corner_cameras()[1], people((0.2, 0.1))
     seen, label = likelihoods([camera], everybody)[0], labels_in(camera, everybody)
@@ -232,9 +229,6 @@ def test_a_border_between_two_people_follows_the_colours() -> None:
 def test_the_same_again() -> None:
     camera, everybody = corner_cameras()[3], people((-0.5, 0.3), (0.3, 0.2))
     np.testing.assert_array_equal(labels_in(camera, everybody), labels_in(camera, everybody))
-
-
-# Appearance
 
 
 TRACKS = np.array([4, 9])

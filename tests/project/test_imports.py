@@ -2,7 +2,6 @@
 
 import ast
 import sys
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -161,13 +160,6 @@ def test_io_is_a_linked_folder_without_init() -> None:
     # With an __init__.py, io would hide Python's own io from type checkers and, without frozen modules, from Python.
     assert not (ROOT / "io" / "__init__.py").exists()
     assert (ROOT / "stseg" / "io" / "track_csv.py").samefile(ROOT / "io" / "track_csv.py")
-
-
-def test_pyproject_lists_every_package() -> None:
-    listed = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["packages"]
-    folders = {path.relative_to(ROOT).parts[:-1] for path in (ROOT / "stseg").rglob("*.py")}
-    folders |= {("stseg", *path.relative_to(ROOT).parts[:-1]) for path in (ROOT / "io").rglob("*.py")}
-    assert sorted(listed) == sorted(map(".".join, folders))
 
 
 def test_a_run_imports_no_library_that_it_does_not_use() -> None:

@@ -55,9 +55,6 @@ def test_rows_are_forgotten_by_themselves() -> None:
     np.testing.assert_array_equal(forgetting.with_prior(2.0, np.ones(3))[0], 3.0)
 
 
-# Reliability of cells
-
-
 GRID = Grid((-1.0, 1.0), (-1.0, 1.0), 0.1, 1.8, 10)
 
 
@@ -111,9 +108,6 @@ def test_of_a_run_file(tmp_path: Path) -> None:
     order = np.argsort(log_odds[seen])
     assert (np.diff(probability[seen][order]) >= 0).all()
     assert 0 < probability[seen].mean() < 1
-
-
-# The border
 
 
 def test_points_have_the_distance_of_their_cell() -> None:

@@ -107,14 +107,6 @@ def test_a_person_is_a_blob() -> None:
     assert ((spread > 0) & (spread < 0.1**2)).all()
 
 
-def test_the_centroid_follows_the_mass() -> None:
-    place = (0.85, 0.75)
-    heavier = np.where(GRID.ground[..., 0] > 0.85, 6.0, 1.0)
-    found = blobs_of(disc(place), place, strength=heavier)
-    assert found.ground[0, 0] > 0.88
-    assert found.ground[0, 1] == pytest.approx(0.75)
-
-
 def test_touching_people_are_two_blobs() -> None:
     left, right = (0.65, 0.75), (1.05, 0.75)
     found = blobs_of(disc(left, right), right, left)

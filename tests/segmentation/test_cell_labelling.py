@@ -30,9 +30,6 @@ BODY = BodyShape(reach=0.4, height_spread=0.12, prior_share=0.02)
 CONFIG = TrackingConfig()
 
 
-# Parts
-
-
 def random_window(seed: int, shape: tuple[int, ...]) -> GridEnergy:
     rng = np.random.default_rng(seed)
     frames, _, rows, columns = shape
@@ -75,9 +72,6 @@ def test_whole_components_of_a_subgraph(seed: int) -> None:
         np.testing.assert_array_equal(one, other)
 
 
-# Shares
-
-
 def places_at(
     *tracks: tuple[float, float], frames: int = 1, spread: float = 0.05, height: float = 1.7
 ) -> PredictedPlaces:
@@ -95,6 +89,7 @@ def places_at(
 def test_shares_by_definition(x: float, y: float, height: float, spread: float, gone: bool) -> None:
     places = places_at((0.8, 0.7), (1.1, 0.6), spread=spread)
     places.expected[0, 1] = not gone
+    places.height[0], places.covariance[0, 1] = (1.4, 1.9), 2 * places.covariance[0, 0]
     cell = np.array([x, y])
     share = track_shares(np.zeros(1, np.int64), cell[None], np.array([height]), places, BODY)[0]
     expected = reference.share(0, cell, height, places, BODY)
@@ -115,22 +110,6 @@ def test_tracks_beyond_the_gate_are_inadmissible() -> None:
     assert share[0, 0] > 0.95
 
 
-def test_shares_follow_distance_and_covariance() -> None:
-    places = places_at((0.8, 0.7), (1.2, 0.7))
-    assert np.ptp(share_at(places, (1.0, 0.7, 1.0))[0, :2]) == pytest.approx(0.0)
-    places.covariance[0, 1] *= 20
-    certain, doubtful, _ = share_at(places, (1.0, 0.7, 1.0))[0]
-    assert certain > doubtful > 0
-
-
-def test_cells_above_a_head_belong_to_the_taller() -> None:
-    places = places_at((0.8, 0.7), (1.2, 0.7))
-    places.height[0] = 1.4, 1.9
-    below, above = share_at(places, (0.95, 0.7, 1.2), (0.95, 0.7, 1.8))
-    assert below[0] > below[1]
-    assert above[0] < above[1]
-
-
 def test_appearance_separates_tracks_in_one_place() -> None:
     places = places_at((1.0, 0.7), (1.0, 0.7))
     appearance = np.array([[2.0, -2.0], [-2.0, 2.0]])
@@ -144,9 +123,6 @@ def test_costs_of_labels_in_quanta() -> None:
     half = round(np.log(2) / QUANTUM)
     assert (energy.first.tolist(), energy.label.tolist()) == ([0, 2, 3], [1, 3, 2])
     assert energy.cost.tolist() == [half - 998, half - 998, 50]
-
-
-# Division
 
 
 def bodies(tracks: Floats, radius: float = 0.24) -> Labels:
@@ -276,9 +252,6 @@ def test_only_the_components_need_expansion(seed: int) -> None:
     assert not everywhere[outside].any()
     if division.cells == occupied.sum():
         np.testing.assert_array_equal(everywhere, division.label.ravel())
-
-
-# Places
 
 
 def detections(*found: tuple[int, int, float, float]) -> DetectionHistory:

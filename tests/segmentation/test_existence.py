@@ -46,9 +46,21 @@ def walk(evidence: Floats, track: int = 1, off: float = 0.0) -> list[tuple[int, 
     return [(t, x, y + off, e, track * (e > 5)) for t, ((x, y), e) in enumerate(zip(WALK, evidence, strict=True))]
 
 
-def test_a_person_seen_badly_for_five_frames_stays() -> None:
-    evidence = np.array([12.0, 12.0, 1.0, 0.5, 0.2, 0.5, 1.0, 12.0, 12.0])
-    assert decide(candidates(*walk(evidence))).real.all()
+@pytest.mark.parametrize(
+    ("evidence", "other", "gone"),
+    [
+        pytest.param((12.0, 12.0, 1.0, 0.5, 0.2, 0.5, 1.0, 12.0, 12.0), (), 0, id="seen badly for five frames"),
+        pytest.param((12.0,) * 3 + (-15.0,) * 6, (), 6, id="strong evidence against a person"),
+        pytest.param((12.0,) * 9, ((4, 1.2, 1.2, 7.0, 2),), 1, id="a ghost that never continues"),
+        pytest.param((12.0,) * 9, ((4, -1.95, -1.95, 7.0, 2),), 0, id="one frame at the border"),
+    ],
+)
+def test_who_stays_and_who_goes(
+    evidence: tuple[float, ...], other: tuple[tuple[int, float, float, float, int], ...], gone: int
+) -> None:
+    found = candidates(*walk(np.array(evidence)), *other)
+    real = decide(found).real
+    assert real[(found.track < 2) & (found.evidence > 0)].all() and (~real).sum() == gone
 
 
 def test_the_height_prior_is_that_of_the_detector() -> None:
@@ -64,23 +76,6 @@ def test_a_certain_path_of_rejected_candidates_is_a_person() -> None:
         rows = found_by_window(found, decision)
         assert len(rows) == paths
         assert all((found.ground[own, 1] == 0).all() and len(own) == 9 for own in rows)
-
-
-def test_strong_evidence_against_a_person_ends_them() -> None:
-    evidence = np.array([12.0, 12.0, 12.0, -15.0, -15.0, -15.0, -15.0, -15.0, -15.0])
-    assert decide(candidates(*walk(evidence))).real.tolist() == [True] * 3 + [False] * 6
-
-
-def test_a_ghost_that_never_continues_goes() -> None:
-    found = candidates(*walk(np.full(9, 12.0)), (4, 1.2, 1.2, 7.0, 2))
-    real = decide(found).real
-    assert not real[found.track == 2].any()
-    assert real[found.track == 1].all()
-
-
-def test_at_the_border_one_frame_may_be_enough() -> None:
-    x, y = RIG.grid.x[0] + 0.05, RIG.grid.y[0] + 0.05
-    assert decide(candidates(*walk(np.full(9, 12.0)), (4, x, y, 7.0, 2))).real.all()
 
 
 def test_two_candidates_of_one_body_exclude_each_other() -> None:

@@ -60,9 +60,6 @@ def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
         np.testing.assert_array_equal(dressed[k][:, 6:], clothes[0][:, 6:])
 
 
-# Specification and cameras
-
-
 @pytest.mark.parametrize(
     ("key", "value"),
     [
@@ -117,9 +114,6 @@ def test_rays_go_through_the_points_that_their_pixels_show(camera: Camera, depth
     np.testing.assert_allclose(depths / np.linalg.norm(camera.projection[2, :3]), depth, rtol=1e-4)
 
 
-# Bodies
-
-
 @pytest.mark.parametrize("phase", [0.0, 0.8, 1.6, 2.7, 4.4])
 @pytest.mark.parametrize("swing", [0.0, 0.5, 1.0])
 def test_bodies_stand_on_the_ground_as_tall_as_they_are(phase: float, swing: float) -> None:
@@ -150,9 +144,6 @@ def test_clothes_belong_to_a_person() -> None:
     assert not np.array_equal(own_clothing(5, 3), own_clothing(5, 4))
     assert not np.array_equal(own_clothing(5, 3), own_clothing(6, 3))
     assert own_clothing(5, 3).shape[0] == len(PARTS)
-
-
-# Drawing
 
 
 @settings(max_examples=8)
@@ -241,9 +232,6 @@ def test_masks_hold_hips_and_feet_of_those_in_full_view() -> None:
     assert checked > 6
 
 
-# The crowd
-
-
 @pytest.mark.parametrize("name", ["easy", "dense", "demo"])
 def test_crowds_keep_apart_come_and_go(name: str) -> None:
     spec = NAMED[name]
@@ -294,9 +282,6 @@ def test_places_do_not_depend_on_the_views() -> None:
     for one, other in zip(walk_freely(TINY), walk_freely(spec), strict=True):
         for field in fields(CrowdFrame):
             np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
-
-
-# Light and noise
 
 
 def test_equal_scenes_are_equal_and_seeds_matter() -> None:
@@ -369,9 +354,6 @@ def test_lamps_that_cannot_be_are_refused(key: str, value: float) -> None:
         Lamp(**{"brightness": 1.0, "on": 0.0, key: value})  # type: ignore[arg-type]
 
 
-# The detector
-
-
 CAMERA = build_rig(replace(TINY, size=(320, 240))).cameras[0]
 
 
@@ -407,9 +389,6 @@ def test_detector_sees_ghosts_now_and_then() -> None:
     nobody, focus = np.zeros((0, 5), np.int64), np.array([1.5, 1.5])
     counts = [len(detect(CAMERA, nobody, nobody, focus, np.random.default_rng(k))) for k in range(400)]
     assert 0.02 < np.mean(counts) < 0.2
-
-
-# Files and the command
 
 
 def test_a_written_scene_reads_back(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from scenes import boxes, found, people, room
 
 from stseg import Tracker
@@ -52,18 +53,13 @@ def apart(spec: SceneSpec, one: int, other: int) -> dict[int, float]:
     return found
 
 
-# Routes
-
-
 @pytest.mark.parametrize("stops", [(), ((0.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0))])
 def test_a_route_is_a_way_through_time(stops: tuple[tuple[float, float, float], ...]) -> None:
-    with pytest.raises(ConfigError, match=r"stops: .*rising times"):
-        Route(1.7, stops)
+    refused(ConfigError, r"stops: .*rising times", Route, 1.7, stops)
 
 
 def test_every_person_of_a_told_scene_has_a_route() -> None:
-    with pytest.raises(ConfigError, match="routes: found 1, expected none, or 2"):
-        replace(standing(), people=2)
+    refused(ConfigError, "routes: found 1, expected none, or 2", replace, standing(), people=2)
 
 
 def test_who_stands_stands_and_who_walks_swings_and_looks_ahead() -> None:
@@ -123,9 +119,6 @@ def test_things_happen_where_windows_end() -> None:
     assert all({frame - 1, frame} & shared for frame in changes)
 
 
-# The whole way
-
-
 @cache
 def filmed(name: str, stop: int) -> tuple[Filmed, ...]:
     return tuple(islice(SceneFilm(NAMED[name]).frame_sets(), stop))
@@ -158,9 +151,6 @@ def test_nobody_is_taken_for_somebody_else_from_boxes(name: str) -> None:
 def test_nobody_is_taken_for_somebody_else_from_silhouettes(name: str) -> None:
     """The first six seconds, in which people cross."""
     assert switches(name, "pixels", 60) == 0
-
-
-# Events
 
 
 LENGTH, RATE = 30, 5.0
@@ -235,9 +225,6 @@ def test_encounters_are_under_new_names_and_never_with_oneself() -> None:
     found = encounters(rows, name, 2, RATE, LENGTH - 1)
     assert [(f, i, o) for f, kind, i, o, _ in found.tolist() if kind == b"merge"] == [(0, 2, 9), (5, 2, 6)]
     assert not len(encounters(rows, lambda _, __: 0, 2, RATE, LENGTH - 1))
-
-
-# The area
 
 
 FIRST, PLACES = 7, [(0.1, 0.0), (-0.2, 0.5), (1.02, 0.2), (-0.4, -1.01)]

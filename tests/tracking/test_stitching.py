@@ -99,23 +99,17 @@ def test_unclaimed_tracks_end_and_begin_at_the_seam(
 
 
 def test_a_track_of_the_warm_up_alone_leaves_nothing() -> None:
-    seams = Stitcher()
-    seams.add(SegmentTracks(0, standing(1, range(20), 0.0), events()))
-    seams.add(
-        SegmentTracks(20, np.concatenate([standing(1, range(15, 40), 0.0), standing(2, range(15, 19), 5.0)]), events())
-    )
-    assert np.unique(seams.joined().committed["id"]).tolist() == [1]
-    assert len(seams.joined().events) == 0
+    later = np.concatenate([standing(1, range(15, 40), 0.0), standing(2, range(15, 19), 5.0)])
+    joined = stitched((standing(1, range(20), 0.0), events()), (later, events()))
+    assert np.unique(joined.committed["id"]).tolist() == [1]
+    assert len(joined.events) == 0
 
 
 def test_the_track_that_is_shared_longest_wins() -> None:
     """One to one: two tracks of the warm-up lie near one earlier track."""
-    seams = Stitcher()
-    seams.add(SegmentTracks(0, standing(1, range(20), 0.0), events()))
     both = np.concatenate([standing(1, range(17, 40), 0.2), standing(2, range(10, 40), -0.2)])
-    seams.add(SegmentTracks(20, both, events()))
-    later = seams.joined()
-    assert later.committed["id"][later.local == 2].tolist()[-1] == 1
+    joined = stitched((standing(1, range(20), 0.0), events()), (both, events()))
+    assert joined.committed["id"][joined.local == 2].tolist()[-1] == 1
 
 
 @settings(max_examples=40)

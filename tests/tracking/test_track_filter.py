@@ -38,9 +38,6 @@ def track_state(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1
     return TrackState(3, 10, np.array([*state, 0.2, -0.1]), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
 
 
-# One track
-
-
 @given(STATES, numbers(0.01, 3), numbers(0.01, 3))
 def test_constant_velocity(state: Floats, first: float, second: float) -> None:
     track = track_state(tuple(state))
@@ -115,9 +112,6 @@ def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
     (track,) = track_filter.tracks
     assert track.height == pytest.approx(sure.height, abs=1e-3)
     assert track.height_variance > sure.height_variance
-
-
-# All of them
 
 
 def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[list[list[int]], TrackFilter]:
@@ -252,9 +246,6 @@ def test_the_same_people_twice() -> None:
         np.testing.assert_array_equal(a.covariance, b.covariance)
 
 
-# Who was not believed
-
-
 def doubted(*places: tuple[float, float], evidence: float) -> People:
     """Rejected candidates."""
     return found(people(*places), evidence=evidence)
@@ -282,9 +273,6 @@ def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: 
     track_filter.update(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
     assert len(track_filter.predict(1) or ()) == looked_for
     assert [track.track for track in track_filter.tracks] == [1, 0][:looked_for]
-
-
-# Consistency
 
 
 MOTION = MotionConfig()
@@ -369,9 +357,6 @@ def test_smoothed_places_err_by_as_much_as_claimed() -> None:
     assert np.mean(squares) == pytest.approx(2.0, abs=4 * 2 / np.sqrt(WALKS))
     # Rows that err alike are worth far less than as many independent ones.
     assert np.mean([np.trace(path[1][STEPS // 2]) for path in paths]) > 0.5 * np.trace(NOISE)
-
-
-# Consistency of the filter in its use
 
 
 PEOPLE, FRAMES = 60, 45

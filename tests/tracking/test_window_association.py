@@ -36,8 +36,6 @@ Path = dict[int, tuple[float, float]]
 """Where somebody is in each frame, metres; frames that it leaves out did not see them."""
 
 
-# Windows
-
 RUNS = st.tuples(st.integers(0, 200), st.integers(1, 150)).map(lambda run: (run[0], run[0] + run[1]))
 
 
@@ -79,9 +77,6 @@ def test_a_part_is_cut_where_the_whole_is(run: tuple[int, int], other: tuple[int
         assert w == open_ended
 
 
-# Assignments
-
-
 @given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 999))
 def test_assignment_of_least_cost(rows: int, columns: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -104,9 +99,6 @@ def walk(start: Sequence[float], velocity: Sequence[float], frames: range) -> Pa
     """Constant velocity in metres per second."""
     dt = 1 / RATE
     return {f: (start[0] + velocity[0] * f * dt, start[1] + velocity[1] * f * dt) for f in frames}
-
-
-# Pieces
 
 
 def column(places: Sequence[tuple[float, float]]) -> Flags:
@@ -213,8 +205,6 @@ def test_a_gap_is_filled_in_order_and_on_the_line() -> None:
     assert (gappy.frames, gappy.blobs) == ([2, 3, 6], [0, 7, 0])
     np.testing.assert_allclose(gappy.between(5), [0.3, 0.6])
 
-
-# Identities over windows
 
 HALF = 4
 """Frames that two windows of these tests share."""
@@ -338,9 +328,6 @@ def test_events_are_of_committed_frames_in_order() -> None:
     born = [i for _, i, _ in events_of(decisions, "birth")]
     assert len(set(born)) == len(born)
     assert set(names.values()) == set(born)
-
-
-# The last look
 
 
 def rows_of(paths: dict[int, Path]) -> Rows:

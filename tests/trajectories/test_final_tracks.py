@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from run_files import table_of
 from scipy.linalg import block_diag
 from scipy.spatial.distance import cdist
 from simulated_people import BORDER, CONFIG, RATE, committed, gone, rows_of, runs, straight, swapped, visit
@@ -119,9 +120,7 @@ def test_tracks_and_events_of_any_run_do_not_contradict(drawn: Rows) -> None:
 def test_nobody_at_all() -> None:
     found = whole(np.zeros(0, TRAJECTORY), events_of())
     assert len(found.trajectory) == len(found.events) == len(found.identity) == 0
-
-
-# Coincidence
+    assert len(smooth_places(np.zeros(0, TRAJECTORY), SMOOTHER_RATE, MOTION)) == 0
 
 
 COINCIDENCE_RATE = 10.0
@@ -129,10 +128,8 @@ COINCIDENCE_RATE = 10.0
 
 def walk(track: int, first: int, stop: int, y: float, score: float) -> Rows:
     """A track along x, 0.1 m a frame."""
-    rows = np.zeros(stop - first, TRAJECTORY)
-    rows["frame"], rows["id"], rows["score"] = np.arange(first, stop), track, score
-    rows["x"], rows["y"] = 0.1 * rows["frame"], y
-    return rows
+    frame = np.arange(first, stop)
+    return table_of(TRAJECTORY, frame=frame, id=track, x=0.1 * frame, y=y, score=score)
 
 
 def test_the_weaker_of_two_coincident_tracks_is_dropped() -> None:
@@ -167,9 +164,6 @@ def test_after_it_no_two_tracks_share_a_place_for_a_second(seed: int) -> None:
     places = left[left["frame"] == 25]
     apart = cdist(places["y"][:, None], places["y"][:, None]) + np.diag(np.full(len(places), np.inf))
     assert apart.min(initial=np.inf) >= 0.12
-
-
-# Smoothed paths
 
 
 SMOOTHER_RATE = 8.0
@@ -275,7 +269,3 @@ def test_paths_smoothed_at_once_are_as_each_alone(
         alone = smoothed_paths(frames[rows] / SMOOTHER_RATE, ground[rows], noise[rows], [np.arange(len(rows))], MOTION)
         np.testing.assert_array_equal(both[0][rows], alone[0])
         np.testing.assert_array_equal(both[1][rows], alone[1])
-
-
-def test_no_rows_are_smoothed() -> None:
-    assert len(smooth_places(np.zeros(0, TRAJECTORY), SMOOTHER_RATE, MOTION)) == 0

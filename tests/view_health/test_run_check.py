@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from recordings import compiled_only, track, write_recording
 from scenes import detector_of, evidence_of, people, room
+from simulated_people import moved
 
 from stseg.arrays import Bytes, Floats
 from stseg.geometry import Rig
@@ -20,15 +21,6 @@ from stseg.view_health.image_shifts import background_shift
 from stseg.view_health.knock_detection import find_knocks, find_residual_step, views_off
 
 CELL = 0.1
-
-
-def moved(rig: Rig, view: int, pixels: float) -> Rig:
-    """The rig with one view's picture of the ground moved to the right."""
-    shift = np.array([[1.0, 0.0, pixels], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    cameras = list(rig.cameras)
-    camera = cameras[view]
-    cameras[view] = replace(camera, ground=shift @ camera.ground, vertical=shift @ camera.vertical)
-    return replace(rig, cameras=tuple(cameras))
 
 
 def residuals(rig: Rig, kind: str, standing: Floats) -> Floats:
@@ -46,7 +38,7 @@ def test_views_of_a_sound_rig_are_not_aside(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 @pytest.mark.parametrize("pixels", [6.0, -6.0])
 def test_the_wrong_view_is_the_one_aside_and_to_which_side(kind: str, pixels: float) -> None:
-    aside = residuals(moved(room(), 1, pixels), kind, people((-0.4, 0.1)))
+    aside = residuals(moved(room(), 1, "u", pixels), kind, people((-0.4, 0.1)))
     assert np.nanargmax(np.abs(aside)) == 1
     # The rig says that people appear further right than they do: the view sees them to the left.
     assert aside[1] * pixels < 0
@@ -97,7 +89,7 @@ def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureF
     recording = read_recording(path)
     assert track(path, tmp_path / "sound.h5") == 0
     assert "calibrate check" not in capsys.readouterr().err
-    write_rig(tmp_path / "wrong.toml", replace(recording, rig=moved(recording.rig, 1, 9.0)))
+    write_rig(tmp_path / "wrong.toml", replace(recording, rig=moved(recording.rig, 1, "u", 9.0)))
     assert track(tmp_path / "wrong.toml", tmp_path / "wrong.h5") == 0
     warned = capsys.readouterr().err
     assert "view east sees people" in warned and "to the left of where the views put them" in warned

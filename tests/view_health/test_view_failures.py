@@ -157,9 +157,6 @@ def test_a_run_says_from_when_to_when_a_view_is_left_out(kind: str) -> None:
     assert len(tracks.summary()) == len(STANDING)
 
 
-# Knocked views
-
-
 KNOCKED = 2
 
 
@@ -223,30 +220,19 @@ def test_tracks_that_err_in_all_views_knock_none(kind: str) -> None:
     assert watch.compare(shown(kind), 3, off) == [False] * 4
 
 
-def test_a_view_that_shows_nothing_is_not_knocked() -> None:
-    watch, seen = Watch("pixels"), shown("pixels")
-    watch.compare(seen, 12)
-    seen[KNOCKED] = np.zeros_like(np.asarray(seen[KNOCKED]))
-    assert watch.compare(seen, 3) == [False] * 4
+@pytest.mark.parametrize(
+    ("views", "standing", "level"), [(4, STANDING, 0), (4, STANDING[:1], 1), (2, STANDING, 1)],
+    ids=["a view that shows nothing", "one person alone", "two views"],
+)  # fmt: skip
+def test_what_may_be_something_else_knocks_no_view(views: int, standing: Floats, level: int) -> None:
+    watch, seen = Watch("pixels", views), shown("pixels", standing, views)
+    watch.compare(seen, 30, standing)
+    seen[-1] = level * np.asarray(aside(seen[-1], 7))
+    assert watch.compare(seen, 3, standing) == [False] * views
 
 
 def test_a_view_that_stands_beside_from_the_start_is_not_knocked() -> None:
     assert Watch("pixels").compare(knocked("pixels"), 30) == [False] * 4
-
-
-def test_one_person_alone_knocks_no_view() -> None:
-    watch, one = Watch("pixels"), STANDING[:1]
-    watch.compare(shown("pixels", one), 30, one)
-    seen = shown("pixels", one)
-    seen[KNOCKED] = aside(seen[KNOCKED], 7)
-    assert watch.compare(seen, 3, one) == [False] * 4
-
-
-def test_of_two_views_none_is_knocked() -> None:
-    watch = Watch("pixels", views=2)
-    seen = shown("pixels", views=2)
-    watch.compare(seen, 12)
-    assert watch.compare([seen[0], aside(seen[1], 7)], 3) == [False] * 2
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -276,9 +262,6 @@ def test_how_far_beside_a_knocked_view_sees_people_is_measured(kind: str) -> Non
     after = detector.explain_next(learned, 0, seen, standing).residual
     assert learned.failures.excluded.tolist() == [k == KNOCKED for k in range(4)]
     assert abs(before[KNOCKED]) < 0.1 and 0.2 < after[KNOCKED] < 0.6
-
-
-# Frozen views
 
 
 FROZEN_KINDS = ("masks", "colour", "boxes")
