@@ -4,7 +4,19 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scenes import BODY, FEW_HEIGHTS, body_points, boxes, detector_of, evidence_of, expecting, people, rig_of, room
+from scenes import (
+    BODY,
+    FEW_HEIGHTS,
+    body_points,
+    boxes,
+    detector_of,
+    evidence_of,
+    expecting,
+    looking,
+    people,
+    rig_of,
+    room,
+)
 
 from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.config import BodyConfig
@@ -59,7 +71,7 @@ def test_a_child_among_adults_is_found_by_boxes(tall: float) -> None:
     cameras = tuple(looking(f"{x}{y}", (x, y, 2.4), size=(640, 480), focal=375.0) for x in (-3, 3) for y in (-3, 3))
     standing = people((0.3, -0.4, tall), (-0.8, 0.3, 1.75))
     detector = Detector(rig_of(cameras), ["boxes"] * 4, FEW_HEIGHTS, BodyConfig())
-    explanation = detector.explain(observed("boxes", cameras, standing), None)
+    explanation = detector.explain(evidence_of("boxes", cameras, standing), None)
     index = assert_found(explanation, standing)
     np.testing.assert_allclose(explanation.people.height[index], standing[:, 2], atol=0.15)
 
