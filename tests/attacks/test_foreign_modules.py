@@ -1,7 +1,5 @@
 """Modules of standard names beside a recording: no process of any command, nor of `stseg.track`, runs them."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

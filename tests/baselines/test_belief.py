@@ -113,13 +113,10 @@ def test_the_jacobians_are_slopes_of_the_homography(camera: Camera, x: float, y:
     np.testing.assert_allclose(view.ground_slope(pixel)[0] @ view.pixel_slope(ground[0]), np.eye(2), atol=1e-7)
 
 
-def test_above_the_horizon_there_is_no_ground() -> None:
+def test_a_view_shows_those_in_its_image_and_no_ground_above_it() -> None:
     far = VIEWS[0].to_ground(np.array([[64.0, -400.0]]))
     assert (np.abs(far) > 1e3).all()
     assert np.isfinite(VIEWS[0].ground_slope(np.array([[64.0, -400.0]]))).all()
-
-
-def test_a_view_shows_those_in_its_image() -> None:
     assert VIEWS[0].shows(np.zeros(2), 1.7, 0.5)
     assert not VIEWS[0].shows(np.array([-3.4, -3.3]), 1.7, 0.5)
 

@@ -173,14 +173,6 @@ def test_inspect_warns_of_an_empty_run(tmp_path: Path, stdout: Command) -> None:
     assert "warning: no person was found" in stdout("inspect", path)
 
 
-def test_export_to_csv_reads_back(run_path: Path, tmp_path: Path, stdout: Command) -> None:
-    stdout("export", run_path, "--to", "csv", "-o", tmp_path / "tracks.csv")
-    table = read_tracks_csv(tmp_path / "tracks.csv")
-    for name in ("frame", "id"):
-        np.testing.assert_array_equal(table[name], small_trajectory()[name])
-    np.testing.assert_allclose(table["x"], small_trajectory()["x"], atol=1e-4)
-
-
 def test_export_to_pedpy_and_mot(run_path: Path, tmp_path: Path) -> None:
     assert main(["export", str(run_path), "--to", "pedpy", "-o", str(tmp_path / "tracks.txt")]) == 0
     lines = (tmp_path / "tracks.txt").read_text().splitlines()

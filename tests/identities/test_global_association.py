@@ -1,15 +1,16 @@
-"""Who is who from the whole run: meetings undone by height and motion, people found again, and the greatest sum."""
+"""Who is who from the whole run: meetings undone by height, motion and looks, people found again, the greatest sum."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulated_people import BORDER, CONFIG, RATE, Path, gone, rows_of, runs, straight, swapped, visit
+from simulated_people import BORDER, CONFIG, RATE, Path, committed, gone, rows_of, runs, straight, swapped, visit
 
-from stseg.arrays import Rows
+from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally
+from stseg.identities.evidence.appearance_model import LearnedAppearance, learn_appearance, row_looks
 from stseg.identities.evidence.size_model import MeasuredSizes
-from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
+from stseg.records.tables import APPEARANCE, COLOURS, EVENT, FEATURES, TRAJECTORY
 from stseg.tracking.row_groups import isolated_tracklets
 
 
@@ -127,3 +128,137 @@ def test_the_prevailing_track_is_that_of_most_rows_around(steps: list[tuple[int,
         (most,) = [one for one in set(around) if 2 * around.count(one) > len(around)] or [int(row["id"])]
         held.append(most)
     assert _prevailing_track(rows, reach).tolist() == held
+
+
+PEOPLE = 6
+FRAMES = range(160)
+
+
+def walkers() -> Rows:
+    """People who walk beside each other, two metres apart."""
+    return committed(rows_of({k: (straight(-5, 2 * k - 7, 0.5, 0), 1.7, FRAMES) for k in range(1, PEOPLE + 1)}))
+
+
+def appearance(rows: Rows, true: Ints, noise: float, differ: float, seed: int, name: str = "features") -> Rows:
+    """What two views see of every row: the person's numbers, the camera's offset, and an error."""
+    rng = np.random.default_rng(seed)
+    size = FEATURES if name == "features" else COLOURS
+    own = differ * rng.normal(size=(int(true.max()) + 1, size))
+    offset = 5.0 * rng.normal(size=(2, size))
+    parts = []
+    for view in range(2):
+        seen = np.zeros(len(rows), APPEARANCE)
+        seen["frame"], seen["x"], seen["y"], seen["view"] = rows["frame"], rows["raw_x"], rows["raw_y"], view
+        seen["features"] = seen["colours"] = np.nan
+        seen[name] = own[true] + offset[view] + noise * rng.normal(size=(len(rows), size))
+        parts.append(seen[rng.random(len(rows)) < 0.7])
+    return np.concatenate(parts)
+
+
+def learned(rows: Rows, looks: Rows, person: Ints | None = None) -> LearnedAppearance:
+    tracklets, person = isolated_tracklets(rows, RATE), rows["id"] if person is None else person
+    return learn_appearance(rows["frame"], row_looks(rows, looks), tracklets, person, RATE)
+
+
+def distance(value: Floats, a: Ints, b: Ints) -> float:
+    return float(np.linalg.norm(np.nanmean(value[a], axis=0) - np.nanmean(value[b], axis=0)))
+
+
+@pytest.mark.parametrize("name", ["features", "colours"])
+def test_people_who_differ_are_far_apart_along_the_axes(name: str) -> None:
+    rows = walkers()
+    found = learned(rows, appearance(rows, rows["id"], 1.0, 1.0, 4, name))
+    assert found.value.shape[1] >= 2
+    assert (found.model.spread > 0.3).any()
+    early, late = rows["frame"] < 80, rows["frame"] >= 80
+    for k in range(1, PEOPLE + 1):
+        own = distance(found.value, (rows["id"] == k) & early, (rows["id"] == k) & late)
+        others = [distance(found.value, (rows["id"] == k) & early, (rows["id"] == j) & late) for j in range(1, k)]
+        assert own < min(others, default=np.inf)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_numbers_that_say_nothing_of_the_person_add_nothing(seed: int) -> None:
+    rows = walkers()
+    found = learned(rows, appearance(rows, rows["id"], 1.0, 0.0, seed))
+    assert found.value.shape == (len(rows), 0)
+    assert len(found.model.spread) == 0
+
+
+def drifting(rows: Rows, noise: float, differ: float, frames: int, name: str) -> Rows:
+    """Looks to which every person adds something else every so many frames."""
+    looks = appearance(rows, rows["id"], noise, differ, 4, name)
+    drift = np.random.default_rng(1).normal(size=(PEOPLE + 1, len(FRAMES) // frames, looks[name].shape[1]))
+    person = np.empty(len(looks), np.int64)
+    for k, (frame, place) in enumerate(zip(looks["frame"], looks["y"], strict=True)):
+        person[k] = rows["id"][(rows["frame"] == frame) & (rows["raw_y"] == place)][0]
+    looks[name] += drift[person, looks["frame"] // frames]
+    return looks
+
+
+def test_looks_that_last_are_believed_less_than_independent_ones() -> None:
+    rows = walkers()
+    fresh, lasting = appearance(rows, rows["id"], 1.0, 1.0, 4), drifting(rows, 0.2, 1.0, 16, "features")
+    assert learned(rows, lasting).model.row_variance.min(initial=np.inf) > learned(rows, fresh).model.row_variance.max()
+
+
+def test_a_weak_axis_lasts_as_long_as_tracklets_say() -> None:
+    """Nobody is confused by the other axes, whatever is believed of how long errors last."""
+    rows = walkers()
+    lasting = learned(rows, drifting(rows, 0.2, 3.0, 4, "colours")).model.row_variance
+    assert lasting.max() > 1.5 * lasting.min()
+
+
+def test_offsets_of_cameras_are_undone() -> None:
+    """A person whom only one camera sees for a while does not seem to change."""
+    rows = walkers()
+    looks = appearance(rows, rows["id"], 0.1, 1.0, 4)
+    looks = looks[(looks["view"] == 0) | (looks["frame"] % 40 < 20)]
+    found = learned(rows, looks)
+    early, late = rows["frame"] % 40 < 20, rows["frame"] % 40 >= 20
+    for k in range(1, PEOPLE + 1):
+        assert distance(found.value, (rows["id"] == k) & early, (rows["id"] == k) & late) < 0.5
+
+
+def associated(rows: Rows, looks: Rows) -> Ints:
+    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
+    return associate_globally(rows, IdentityProblem.of(rows, sizes, looks, RATE, BORDER, CONFIG)).identity
+
+
+def test_features_tell_two_apart_who_are_equally_tall() -> None:
+    """Two stand together and are swapped by the filter; four others walk by, from whom features are learned."""
+    others = {k: (straight(-5, k - 1, 0.5, 0), 1.7, FRAMES) for k in range(3, 6)}
+    true = committed(rows_of({1: (visit(-1), 1.70, FRAMES), 2: (visit(1), 1.70, FRAMES)} | others, noise=0.0))
+    exchanged, pair = true.copy(), true["id"] <= 2
+    exchanged[pair] = swapped(true[pair], 80)
+    for rows in (true, exchanged):
+        found = associated(rows, appearance(rows, true["id"], 1.0, 1.0, 4))
+        apart = ~np.isin(rows["frame"], range(72, 89))
+        np.testing.assert_array_equal(found[apart], true["id"][apart])
+
+
+def dance(side: float, y: float) -> Path:
+    """Two stand together every 4 s and part again."""
+    return lambda t: (side * (0.1 + abs(np.sin(np.pi * t / 4))), y)
+
+
+def test_appearance_is_learned_from_mostly_wrong_identities() -> None:
+    """Pairs of equally tall people, who are exchanged or not each time they stand together."""
+    paths = {2 * k + side: (dance(2 * side - 1, 3.0 * k), 1.7, FRAMES) for k in range(3) for side in (0, 1)}
+    rows = committed(rows_of({track + 1: path for track, path in paths.items()}))
+    rng = np.random.default_rng(2)
+    crossed = np.cumsum(rng.random((3, 6)) < 0.5, axis=1) % 2
+    index = rows["id"] - 1
+    meeting = (rows["frame"] / RATE / 4).astype(int)
+    true = 1 + index // 2 * 2 + (index % 2 + crossed[index // 2, meeting]) % 2
+    found = associated(rows, appearance(rows, true, 1.0, 1.0, 4))
+    apart = np.abs(rows["x"]) > 0.6
+    pairs, count = np.unique(np.stack([found[apart], true[apart]]), axis=1, return_counts=True)
+    assert pairs.shape[1] == 6, (pairs, count)
+
+
+def test_without_rows_nothing_is_learned() -> None:
+    rows = walkers()[:0]
+    assert learned(rows, np.zeros(0, APPEARANCE)).value.shape == (0, 0)
+    one = walkers()
+    assert learned(one, np.zeros(0, APPEARANCE)).value.shape == (len(one), 0)

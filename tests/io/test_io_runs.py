@@ -205,9 +205,8 @@ def interruptible() -> Iterator[None]:
 def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     steps = iter(range(1000))
     patch_file(monkeypatch, lambda _: signal.raise_signal(signal.SIGINT) if next(steps) == step else None)
-    with pytest.raises(KeyboardInterrupt), writer_at(tmp_path / "night.h5") as writer:
-        fill(writer)
-        writer.finish(Tracks(small_trajectory()).summary())
+    with pytest.raises(KeyboardInterrupt):
+        write_small_run(tmp_path / "night.h5")
     assert next(steps) > step
     assert [file.name for file in tmp_path.iterdir()] == ["left.avi"]
     gc.collect()  # a file that HDF5 could not close would crash here
@@ -239,9 +238,7 @@ def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: py
     def write(trace: "TraceFunction | None") -> None:
         sys.settrace(trace)
         try:
-            with writer_at(tmp_path / "night.h5", overwrite=True) as writer:
-                fill(writer)
-                writer.finish(Tracks(small_trajectory()).summary())
+            write_small_run(tmp_path / "night.h5", overwrite=True)
         finally:
             sys.settrace(None)
             assert not parts_of(tmp_path / "night.h5"), reached[-1:]
@@ -271,8 +268,7 @@ def test_the_part_of_a_killed_run_alone_is_removed(tmp_path: Path) -> None:
 def test_two_runs_into_one_file_are_refused(tmp_path: Path) -> None:
     with writer_at(tmp_path / "night.h5") as writer:
         fill(writer)
-        with pytest.raises(OutputError, match="another run"), writer_at(tmp_path / "night.h5"):
-            pass
+        refused(OutputError, "another run", write_small_run, tmp_path / "night.h5")
         writer.finish(Tracks(small_trajectory()).summary())
     assert len(read_run(tmp_path / "night.h5").frames) == 6
 
@@ -298,8 +294,7 @@ def test_impossible_places_are_refused_before_any_work(tmp_path: Path, name: str
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "open", Mock(side_effect=PermissionError(13, "Permission denied")))
-    with pytest.raises(OutputError, match="Permission denied"), writer_at(tmp_path / "night.h5"):
-        pass
+    refused(OutputError, "Permission denied", write_small_run, tmp_path / "night.h5")
 
 
 @pytest.mark.parametrize("room", [0, 100, 3000, 8000, 12000, 16000, 20000])
@@ -316,9 +311,7 @@ def test_a_full_disk_is_told_and_leaves_the_old_file(
             raise OSError(28, "No space left on device")
 
     patch_file(monkeypatch, fill_up)
-    with pytest.raises(OutputError, match="No space left on device"), writer_at(path, overwrite=True) as writer:
-        fill(writer)
-        writer.finish(Tracks(small_trajectory()).summary())
+    refused(OutputError, "No space left on device", write_small_run, path, overwrite=True)
     assert path.read_text() == "old"
     assert not parts_of(path)
     gc.collect()  # a file that HDF5 could not close would crash here

@@ -120,14 +120,6 @@ def test_a_footprint_has_the_spread_of_the_cells_image(distortion: Sequence[floa
     np.testing.assert_allclose(footprint[whole][:, 2:], sides[whole], atol=0.51, rtol=0.02)
 
 
-def test_cells_outside_the_polygon_are_not_seen() -> None:
-    triangle = np.array([[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0]])
-    rig = replace(COARSE, grid=replace(COARSE.grid, polygon=triangle))
-    views = Sampling.of(rig, "footprint").views()
-    assert (views[:, ~rig.grid.inside()] == 0).all()
-    assert (views[0][rig.grid.inside()] == 4).all()
-
-
 @settings(max_examples=15)
 @given(st.integers(0, 999))
 def test_likelihood_per_plane_by_definition(seed: int) -> None:
@@ -223,17 +215,15 @@ def volume_by_definition(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("blind", [None, 2])
+@pytest.mark.parametrize("blind", [(), (2,), range(4)])
 @pytest.mark.parametrize("step", [1, 3])
-def test_fusion_by_definition(kind: SamplingKind, blind: int | None, step: int) -> None:
+def test_fusion_by_definition(kind: SamplingKind, blind: Sequence[int], step: int) -> None:
     standing = people((-0.8, 0.3), (1.0, -0.6))
     rng = np.random.default_rng(step)
     shape = (-(-96 // step), -(-128 // step))
     owner = [np.where(rng.random(shape) < 0.6, -1, rng.integers(0, 2, shape)) for _ in range(4)]
     explanation = explained(COARSE, standing, owner, step)
-    maps: list[Singles | None] = [*noise(step)]
-    if blind is not None:
-        maps[blind] = None
+    maps = [None if view in blind else shown for view, shown in enumerate(noise(step))]
     fused = Occupancy(COARSE, PIXELS, replace(CONFIG, sampling=kind), FEW_HEIGHTS, BODY).fuse(maps, explanation).dense()
     assert fused.dtype == np.float32
     np.testing.assert_allclose(fused, volume_by_definition(COARSE, maps, explanation, kind), atol=LEVEL)
@@ -271,13 +261,6 @@ def test_more_views_are_sharper_evidence(value: float) -> None:
     sharper = CONFIG.effective_observations * reference.log_odds_term(value, RATES)
     np.testing.assert_allclose(fused[views > 0], sharper * views[views > 0] + PRIOR, atol=LEVEL)
     assert np.isnan(fused[views == 0]).all()
-
-
-def test_all_blind_leaves_the_prior() -> None:
-    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
-    fused = occupancy.fuse([None] * 4, explained(COARSE, people())).dense()
-    np.testing.assert_allclose(fused[occupancy.views > 0], PRIOR, rtol=1e-6)
-    assert np.isnan(fused[occupancy.views == 0]).all()
 
 
 def line_of_sight() -> tuple[Rig, Explanation]:
