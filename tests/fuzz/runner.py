@@ -1,27 +1,20 @@
-"""Runs targets on mutated files, each target in a process of its own that may crash, hang or grow.
+"""Runs targets on mutated files, each target in a process of its own that may crash, hang or grow."""
 
-`python -m tests.fuzz --minutes 60` fuzzes all targets for an hour in all; `--target run.h5` one of them. What fails is
-printed with its seed, and kept in the folder `fuzz-failures`.
-"""
-
-import argparse
 import mmap
 import os
 import resource
 import signal
 import struct
-import sys
 import tempfile
 import time
 import traceback
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from fuzz.targets import TARGETS, Target, answer
+from fuzz.targets import Target, answer
 
 SECONDS = 10.0
 """Longest CPU time that one file may take."""
@@ -110,37 +103,3 @@ def _one(target: Target, path: Path, data: bytes) -> None:
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     if held > MEBI:
         raise AssertionError(f"{held} MiB of memory")
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; status 1 where something failed."""
-    parser = argparse.ArgumentParser(prog="python -m tests.fuzz")
-    parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--target", action="append", help="only this one; may be given several times")
-    given = parser.parse_args(arguments)
-    targets = [target for target in TARGETS if not given.target or target.name in given.target]
-    failed = 0
-    for target in targets:
-        until = time.monotonic() + 60 * given.minutes / len(targets)
-        count, failures = fuzz(target, given.seed, until, sys.maxsize - given.seed)
-        failed += len(failures)
-        _say(f"{target.name:20} {count:8} files, {len(failures)} failures")
-        for reason in dict.fromkeys(failure.reason for failure in failures):
-            seeds = [failure.seed for failure in failures if failure.reason == reason]
-            _say(f"    {reason}: seeds {seeds[:5]}{' ...' if len(seeds) > 5 else ''}")
-            _keep(target, seeds[0])
-    return 1 if failed else 0
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
-
-
-def _keep(target: Target, seed: int) -> None:
-    folder = Path("fuzz-failures")
-    folder.mkdir(exist_ok=True)
-    with tempfile.TemporaryDirectory() as name:
-        data = content(target, target.valid(Path(name)), seed)
-    (folder / f"{Path(target.name).stem}-{seed}{target.suffix}").write_bytes(data)
