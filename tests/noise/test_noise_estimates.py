@@ -95,11 +95,11 @@ def test_the_spread_of_boxes_is_found(spread: float) -> None:
 
 @pytest.mark.parametrize("bias", [-0.05, 0.0, 0.05])
 def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
-    cameras = corner_cameras()
-    frame_pass, estimate = Detector(rig_of(cameras), ["boxes"] * 4, FEW_HEIGHTS, BODY), BoxBiasEstimate(RATE, CONFIG)
-    standing, sizes = people((-0.5, 0.3, 1.7), (0.5, -0.4, 1.7)), [camera.size for camera in cameras]
-    bodies = [view.table.boxes_of(*standing_of(standing)) for view in frame_pass.views]
-    lower = [body[:, 3] - bias * (body[:, 3] - body[:, 1] + EDGE_GRAIN[LOWER_EDGE_BELOW]) for body in bodies]
+    frame_pass, estimate = detector_of(room(), "boxes"), BoxBiasEstimate(RATE, CONFIG)
+    standing, sizes = people((-0.5, 0.3, 1.7), (0.5, -0.4, 1.7)), [view.camera.size for view in frame_pass.views]
+    bodies = [view.table.boxes_of(standing[:, :2], standing[:, 2]) for view in frame_pass.views]
+    grain = box_fit.EDGE_GRAIN[box_fit.LOWER_EDGE_BELOW]
+    lower = [body[:, 3] - bias * (body[:, 3] - body[:, 1] + grain) for body in bodies]
     delivered = [boxes_of_edges(np.column_stack([body[:, :3], edge])) for body, edge in zip(bodies, lower, strict=True)]
     for _ in range(25):
         corrected = estimate.corrected(delivered, sizes)
