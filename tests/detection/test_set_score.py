@@ -1,17 +1,13 @@
 """Score of a set by definition, and gains of a set's state: the differences of scores."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import reference_core as reference
-from crafted_frames import PARAMETERS, CraftedFrame, hiders_of_cover, in_rooms, random_frame, scaled, two_births
-from reference_core import best_pairs
+from crafted_frames import PARAMETERS, CraftedFrame, in_rooms, random_frame, scaled
 from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Floats
 from stseg.bodies.outlines import paint_outlines
-from stseg.detection.problem import BoxEvidence, PixelEvidence
 from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_score, pixel_score, set_score
 from stseg.detection.score.set_state import (
     Kept,
@@ -50,7 +46,7 @@ def test_a_score_has_its_evidence_and_tracks(seed: int) -> None:
     np.testing.assert_array_equal(evidence, problem.view_evidence[:, :3])
     gains = frame.birth_cost[members, None] + frame.track_gain[members]
     pairs = [(a, track) for a, track in enumerate(tracks) if track >= 0]
-    assert sum(gains[pair] for pair in pairs) == pytest.approx(sum(gains[pair] for pair in best_pairs(gains)))
+    assert sum(gains[pair] for pair in pairs) == pytest.approx(sum(gains[pair] for pair in reference.best_pairs(gains)))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -81,37 +77,6 @@ def test_boxes_of_all_views_are_assigned_as_of_each(seed: int) -> None:
     assert (boxes >= 0).any()
 
 
-def test_a_box_is_evidence_for_one_person() -> None:
-    cover = np.zeros((1, 2, 2))
-    boxes = BoxEvidence(np.zeros((1, 2, 1)), np.array([1]), hiders_of_cover(cover), np.ones((1, 2)), np.ones(2))
-    pixels = random_frame(0, 2).pixels
-    frame = two_births(boxes, pixels._replace(raster=np.zeros_like(pixels.raster)))
-    assert frame.score([0]) - frame.score([]) == pytest.approx(PARAMETERS.prior_log_odds + PARAMETERS.box_log_ratio)
-    missing = PARAMETERS.prior_log_odds + np.log(PARAMETERS.box_miss_rate)
-    assert frame.score([0, 1]) - frame.score([0]) == pytest.approx(missing)
-
-
-def test_a_pixel_belongs_to_the_nearest_body() -> None:
-    spans = np.array([[[[0, 4]], [[2, 6]]]], np.int16)
-    raster = np.array([[[1, 1, 1, 1, -5, -5]]], np.float32)
-    first, area, distance = np.zeros((1, 2), np.int64), np.full((1, 2), 4.0), np.array([[3.0, 2.0]])
-    frame = two_births(None, PixelEvidence(raster, np.zeros_like(raster), first, spans, area, distance))
-    prior, weight = PARAMETERS.prior_log_odds, PARAMETERS.effective_observations
-    nearest = prior + weight * (1 + 1 - 5 - 5) / 4
-    assert frame.score([1]) == pytest.approx(nearest)
-    assert frame.score([0, 1]) == pytest.approx(nearest + prior + weight * (1 + 1) / 4)
-
-
-def test_pixels_weigh_no_more_than_in_the_largest_body() -> None:
-    """A small far body in the head of a near one: two of eight pixels are a quarter of the near one's evidence."""
-    spans = np.array([[[[0, 8]], [[0, 2]]]], np.int16)
-    raster, scale = np.ones((1, 1, 8), np.float32), np.full((1, 1, 8), 8.0, np.float32)
-    first, area, distance = np.zeros((1, 2), np.int64), np.array([[8.0, 2.0]]), np.array([[2.0, 6.0]])
-    frame = two_births(None, PixelEvidence(raster, scale, first, spans, area, distance))
-    evidence = [frame.score([i]) - PARAMETERS.prior_log_odds for i in range(2)]
-    assert evidence == pytest.approx([PARAMETERS.effective_observations, PARAMETERS.effective_observations / 4])
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_painted_pixels_are_those_of_the_score(seed: int) -> None:
     frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
@@ -124,9 +89,6 @@ def test_painted_pixels_are_those_of_the_score(seed: int) -> None:
         paint_outlines(farthest_first, pixels.first[view][members], pixels.spans[view][members], painted)
         assert (painted >= 0).any()
         np.testing.assert_array_equal(painted.ravel(), owner)
-
-
-# The state of a set
 
 
 def assert_nearest_own_pixels(state: SetState) -> None:
