@@ -1,4 +1,4 @@
-"""A short round of fuzzing with fixed seeds; `python tools/fuzz.py --minutes 60` goes on."""
+"""A short round of fuzzing with fixed seeds; `python tools/fuzzing.py --minutes 60` goes on."""
 
 import sys
 import time

@@ -1,7 +1,7 @@
 """Fuzzing of all parsers and readers for as long as is asked for.
 
-python tools/fuzz.py --minutes 60          all targets for an hour in all
-python tools/fuzz.py --target run.h5       one of them
+python tools/fuzzing.py --minutes 60          all targets for an hour in all
+python tools/fuzzing.py --target run.h5       one of them
 
 Failures are printed with their seeds; the first file of each is kept in the folder `fuzz-failures`.
 """
