@@ -222,7 +222,7 @@ def test_a_mask_is_read_as_likelihood() -> None:
     likelihood = mask_likelihood(np.array([[0, 51, 255]], np.uint8))
     assert likelihood.dtype == np.float32
     np.testing.assert_allclose(likelihood, [[0, 0.2, 1]])
-    refused(SourceError, "", mask_likelihood, np.zeros((2, 2, 3), np.uint8))
+    refused(SourceError, "expected", mask_likelihood, np.zeros((2, 2, 3), np.uint8))
 
 
 def boxes_of(*rows: tuple[float, float, float, float], score: list[float] | None = None) -> Boxes:
@@ -269,7 +269,7 @@ def test_instance_boxes_are_tight(instances: NDArray[np.uint16]) -> None:
         expected.append(np.array([u.min() - 0.5, v.min() - 0.5, np.ptp(u) + 1.0, np.ptp(v) + 1.0]))
     np.testing.assert_array_equal(boxes.pixel, np.array(expected).reshape(-1, 4))
     np.testing.assert_array_equal(boxes.score, 1)
-    refused(SourceError, "", instance_boxes, instances.astype(np.uint8))
+    refused(SourceError, "expected", instance_boxes, instances.astype(np.uint8))
 
 
 def test_people_in_a_real_room_are_found() -> None:

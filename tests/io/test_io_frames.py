@@ -81,7 +81,7 @@ def test_each_kind_gives_its_array(
     with open_frames(rec) as reader:
         for frame_set in reader:
             (view,) = map(np.asarray, frame_set.views)
-            assert (view.shape, view.dtype) == (shape, dtype)
+            assert view.shape == shape and view.dtype == dtype
             assert (view == 10 * frame_set.frame).all()
     assert frame_set.frame == 2
     assert index_streams(rec).length == 3
