@@ -31,8 +31,11 @@ def away_from_border(open_to_people: Flags, cell: float) -> Floats:
     return away[1:-1, 1:-1]
 
 
-def kalman(state: Floats, covariance: Floats, place: Floats, noise: Floats, matrix: Floats) -> tuple[Floats, Floats]:
-    """The textbook's correction of a state by a measured place."""
+def kalman(
+    state: Floats, covariance: Floats, place: Floats, noise: Floats, matrix: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """The textbook's correction of a state by a measured place, `matrix` times the state; its first two by default."""
+    matrix = np.eye(2, len(state)) if matrix is None else matrix
     gain = covariance @ matrix.T @ np.linalg.inv(matrix @ covariance @ matrix.T + noise)
     return state + gain @ (place - matrix @ state), (np.eye(len(state)) - gain @ matrix) @ covariance
 

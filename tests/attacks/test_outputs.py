@@ -83,7 +83,7 @@ def test_no_command_replaces_what_it_reads(
         Path("soft.mp4").unlink()
 
 
-def test_pictures_and_tables_replace_nothing_foreign_in_their_folder(folder: Path, refusal: Command) -> None:
+def test_pictures_and_tables_replace_nothing_foreign(folder: Path, refusal: Command) -> None:
     Path("west.png").write_bytes(Path("photo.png").read_bytes())
     Path("zones.csv").write_text("zone,mine\n")
     Path("plan.png").write_bytes(b"precious")

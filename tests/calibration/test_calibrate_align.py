@@ -89,7 +89,7 @@ def test_wrong_points_are_named(room: Path) -> None:
     refused(CalibrationError, r"'roof', expected a camera of the rig: cam1", align_rig, room, one, placed)
 
 
-def test_a_ground_counted_downwards_is_named_with_the_sign_to_change(room: Path) -> None:
+def test_a_ground_counted_downwards_is_named_with_its_sign(room: Path) -> None:
     rig = read_recording(room).rig
     downwards = np.array([camera.projection * [1, -1, 1, 1] for camera in rig.cameras])
     sizes = [camera.size for camera in rig.cameras]

@@ -14,6 +14,7 @@ import h5py
 import pytest
 from attacks import write_rig
 from recordings import COMMAND, OPTIONS, assert_same, compiled_only, process, run_words, started, track, write_recording
+from refusals import Command
 from run_files import write_small_run
 
 from stseg.commands.main import main
@@ -119,9 +120,9 @@ def content_of(folder: Path) -> dict[str, tuple[bytes, int]]:
 
 @LINUX
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can become another user")
-def test_files_of_another_user_are_left_alone(shared: Path) -> None:
+def test_files_of_another_user_are_left_alone(shared: Path, stdout: Command) -> None:
     run = write_small_run(shared / "run.h5")
-    (shared / "open" / "t.csv").write_text("precious")
+    stdout("export", run, "--to", "csv", "-o", shared / "open" / "t.csv")
     secret = write_small_run(shared / "secret.h5")
     secret.chmod(0o600)
     before = content_of(shared)
@@ -132,7 +133,7 @@ def test_files_of_another_user_are_left_alone(shared: Path) -> None:
     }
     lines = process(AS_NOBODY, json.dumps([command.split() for command in tried])).stderr.splitlines()
     assert lines[1::2] == ["status 2"] * len(tried), "\n".join(lines)
-    assert all(what in line for line, what in zip(lines[::2], tried.values(), strict=True)), lines
+    assert all(what in line for line, what in zip(lines[::2], tried.values(), strict=True)), "\n".join(lines)
     assert content_of(shared) == before
 
 

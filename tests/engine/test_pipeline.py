@@ -187,7 +187,7 @@ def test_a_part_keeps_its_frame_numbers(first: int) -> None:
 
 @pytest.mark.parametrize("first", [3, 8])
 def test_where_a_run_began_is_soon_forgotten(first: int) -> None:
-    """A frame's prior comes from the frames before it, so where a run began matters: here, a little.
+    """A frame's prior comes from the frames before it, so where a run began matters: for a second.
 
     Its first frame is explained as any first frame is, by itself.
     """
@@ -196,9 +196,9 @@ def test_where_a_run_began_is_soon_forgotten(first: int) -> None:
     views = recording("boxes", FRAMES)[first].views
     alone = pipeline.detector.explain([view for view in views if isinstance(view, Boxes)], None)
     np.testing.assert_array_equal(part.steps[0].commit.frames[0].people.ground, alone.people.ground)
-    for step, other in zip(part.steps, whole("boxes", "frames").steps[first:], strict=True):
+    for k, (step, other) in enumerate(zip(part.steps, whole("boxes", "frames").steps[first:], strict=True)):
         places, others = (np.sort(s.commit.frames[0].people.ground, axis=0) for s in (step, other))
-        np.testing.assert_allclose(places, others, atol=0.03)
+        np.testing.assert_allclose(places, others, atol=0.04 if k < RIG.frame_rate else 0.005)
 
 
 @pytest.mark.parametrize("frames", [1, 7, 8, 9])
