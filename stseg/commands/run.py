@@ -119,15 +119,20 @@ def run(
 
         pixels, inputs = require_pixels(recording), Inputs(recording_files(recording))
         require_label_folder(labels, [recording.rig.cameras[k].name for k in pixels], overwrite, inputs)
+    _warn(source_warnings(recording))
     done = track_recording(
         recording, output, resolved, tracker, volume, chosen, workforce, reporter, known=known, overwrite=overwrite
     )
-    for warning in (*source_warnings(recording), *rig_warnings(done)):
-        print(f"stseg: warning: {warning}", file=sys.stderr)
+    _warn(rig_warnings(done))
     print(_summary(done))
     if labels is not None:
         count = label_images(done, labels, config=resolved, overwrite=overwrite, progress=reporter)
         print(f"{labels}: {count} label images")
+
+
+def _warn(warnings: list[str]) -> None:
+    for warning in warnings:
+        print(f"stseg: warning: {warning}", file=sys.stderr)
 
 
 def _require_alone(workers: int | None, scheduler: str | None, labels: Path | None, known: Path | None) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.errors import ConfigError
-from stseg.evaluation.alignment import Alignment, best_placing
+from stseg.evaluation.alignment import Alignment, best_motion, moved_rows
 from stseg.evaluation.clear import (
     Matches,
     false_tracks,
@@ -163,10 +163,10 @@ def evaluate(
         raise ConfigError("evaluation", "gate", gate, "metres, above 0")
     if area is not None and not (area[0] < area[2] and area[1] < area[3]):
         raise ConfigError("evaluation", "area", area, "x0, y0, x1, y1 in metres with x0 below x1 and y0 below y1")
-    placing = best_placing(truth, trajectory, gate, align)
-    sequence = align_frames(truth, placing.of(trajectory), gate, area, frames, ignore_flagged)
+    motion = best_motion(truth, trajectory, gate, align)
+    sequence = align_frames(truth, moved_rows(trajectory, motion), gate, area, frames, ignore_flagged)
     matches = match_per_frame(sequence, gate), match_with_continuity(sequence, gate)
-    return _score(sequence, *matches, gate, area, abs(placing.factor))
+    return _score(sequence, *matches, gate, area, abs(motion.factor))
 
 
 def _score(

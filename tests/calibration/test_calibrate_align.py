@@ -10,7 +10,7 @@ from refusals import refused
 from simulated_people import ring
 
 from stseg.commands.calibrate.align import align
-from stseg.errors import CalibrationError
+from stseg.errors import CalibrationError, OutputError
 from stseg.geometry import Rig
 from stseg.geometry.ground_motion import GroundMotion
 from stseg.io.recording.recording import CameraSource, Recording, Source
@@ -95,3 +95,13 @@ def test_a_ground_counted_downwards_is_named_with_its_sign(room: Path) -> None:
     sizes = [camera.size for camera in rig.cameras]
     message = r"camera cam1: ground: found a mirrored ground .* change the sign of y"
     refused(CalibrationError, message, Rig.from_projections, downwards, sizes, rig.grid, 5.0)
+
+
+def test_an_aligned_rig_is_replaced_and_no_input(room: Path) -> None:
+    known, placed = points(room), room.parent / "placed.toml"
+    align_rig(room, known, placed)
+    refused(OutputError, r"placed.toml: found a file", align_rig, room, known, placed)
+    align_rig(room, known, placed, overwrite=True)
+    for read in (room, known):
+        with pytest.raises(OutputError, match=r"a file that is read here"):
+            align_rig(room, known, read, overwrite=True)

@@ -34,7 +34,7 @@ STAGES: dict[str, set[str]] = {
 BESIDE = {
     "trackers": {"occupancy", "segmentation", "tracking", SOLVER},
     "baselines": {"trackers", "tracking", "occupancy"},
-    "evaluation": {"errors", "arrays"},
+    "evaluation": {"errors", "arrays", "geometry"},
     "measures": {"errors", "arrays", "geometry"},
     "io": {"version", "errors", "arrays", "config", "geometry", "records"},
     "calibration": {"errors", "arrays", "geometry", "bodies"},

@@ -24,9 +24,9 @@ class TrackAssignment(NamedTuple):
     gains: RaggedArray
     """The tracks that each candidate gains by, with the gain against a birth, nats."""
     followers: RaggedArray
-    """The candidates who gain by each track, with that gain."""
+    """The candidates that gain by each track, with that gain."""
     member_of: Ints
-    """int64 (track,): the member who continues each track, -1 for none."""
+    """int64 (track,): the member that continues each track, -1 for none."""
     member_gain: Floats
     """float64 (track,): the gain of that, nats."""
     reached: Ints
@@ -72,7 +72,7 @@ def assign_track(i: int, state: TrackAssignment) -> None:
 
 @kernel
 def release_track(i: int, inside: Flags, state: TrackAssignment) -> None:
-    """Assign the track of candidate i, who has left the set, inside (candidate,), where the sum is greatest.
+    """Assign the track of candidate i, which has left the set, inside (candidate,), where the sum is greatest.
 
     Another member takes it, its track goes to a third, and so on: the best path from the free track on.
     """
@@ -98,21 +98,21 @@ def release_track(i: int, inside: Flags, state: TrackAssignment) -> None:
                         reached[number] = other
                         number += 1
                     path_gain[other], state.before[other], is_longer = value, track, True
-    end, newcomer, best = free, -1, 0.0
+    end, joining, best = free, -1, 0.0
     for r in range(number):
         track = reached[r]
         if path_gain[track] > best:
-            end, newcomer, best = track, -1, path_gain[track]
+            end, joining, best = track, -1, path_gain[track]
         for k in range(followers.start[track], followers.start[track + 1]):
             j = followers.item[k]
             if path_gain[track] + followers.value[k] > best and inside[j] and _track_of(j, state) < 0:
-                end, newcomer, best = track, j, path_gain[track] + followers.value[k]
+                end, joining, best = track, j, path_gain[track] + followers.value[k]
     while end >= 0:
         leaving = state.member_of[end]
-        state.member_of[end] = newcomer
-        if newcomer >= 0:
-            state.member_gain[end] = _gain_of(newcomer, end, state.gains)
-        newcomer, end = leaving, state.before[end]
+        state.member_of[end] = joining
+        if joining >= 0:
+            state.member_gain[end] = _gain_of(joining, end, state.gains)
+        joining, end = leaving, state.before[end]
     _clear_paths(number, state)
 
 

@@ -15,9 +15,10 @@ from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.geometry.ground_motion import GroundMotion, fit_motion
 from stseg.io.calibrations.point_files import read_points
-from stseg.io.outputs.whole_files import require_new
+from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_recording, write_rig
+from stseg.io.recording.source_files import recording_files
 
 _SAMPLES = 12
 """Pixels along each side of an image that two rigs are compared at."""
@@ -101,8 +102,8 @@ def align_rig(
         Where a file cannot be read, a pixel does not show the ground, or the points do not fix the ground.
     """
     reference, output = Path(reference), Path(output)
-    require_new(output, overwrite)
     recording = recording_of(rig)
+    require_output(output, overwrite, Inputs([reference, recording.path], recording_files(recording)))
     if reference.suffix.lower() == ".toml":
         found = _shared_pixels(recording.rig, read_recording(reference).rig, reference)
     else:
@@ -112,7 +113,7 @@ def align_rig(
     away = np.linalg.norm(motion.of(source) - target, axis=1)
     _require_determined(reference, source, target, away)
     aligned = replace(recording, path=output, rig=motion.of_rig(recording.rig))
-    write_rig(output, aligned)
+    write_rig(output, aligned, overwrite)
     points = tuple(
         AlignedPoint(camera, line, (float(x), float(y)), float(off))
         for (camera, line, _, (x, y)), off in zip(found, away, strict=True)
