@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,7 +91,7 @@ def run(
     from stseg.engine.workers.workforce import Workforce
     from stseg.io.config_file import read_config
     from stseg.io.recording.rigs import read_recording
-    from stseg.tasks.warnings import rig_warnings, source_warnings
+    from stseg.tasks.warnings import source_warnings
 
     chosen, workforce = FrameRange.parsed(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_recording(rig), TerminalReporter()
@@ -108,8 +109,11 @@ def run(
         followed = follow_recording(
             recording, output, resolved, tracker, volume, chosen, reporter, publish=receiver, overwrite=overwrite
         )
-        nothing = f"{output}: not written, since nothing came"
-        print(nothing if followed is None else f"{_summary(followed.run)}{followed.delay}")
+        if followed is None:
+            print(f"{output}: not written, since nothing came")
+        else:
+            _warn(followed.run.warnings)
+            print(f"{_summary(followed.run)}{followed.delay}")
         return
     if labels is not None:
         from stseg.io.outputs.label_images import require_label_folder
@@ -119,18 +123,19 @@ def run(
 
         pixels, inputs = require_pixels(recording), Inputs(recording_files(recording))
         require_label_folder(labels, [recording.rig.cameras[k].name for k in pixels], overwrite, inputs)
-    _warn(source_warnings(recording))
+    earlier = source_warnings(recording)
+    _warn(earlier)
     done = track_recording(
         recording, output, resolved, tracker, volume, chosen, workforce, reporter, known=known, overwrite=overwrite
     )
-    _warn(rig_warnings(done))
+    _warn(words for words in done.warnings if words not in earlier)
     print(_summary(done))
     if labels is not None:
         count = label_images(done, labels, config=resolved, overwrite=overwrite, progress=reporter)
         print(f"{labels}: {count} label images")
 
 
-def _warn(warnings: list[str]) -> None:
+def _warn(warnings: Iterable[str]) -> None:
     for warning in warnings:
         print(f"stseg: warning: {warning}", file=sys.stderr)
 

@@ -10,9 +10,6 @@ from stseg.io.runfile.runs import Run
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
 from stseg.records.tables import ERROR_RATES
 from stseg.reporting.run_statistics import ground_by_views, people_per_minute
-from stseg.tasks.warnings import run_warnings
-
-_BLIND_SHARE = 0.05  # of the ground that no view sees, from which on it is worth a warning
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,6 @@ def summarise_run(run: Run) -> Overview:
     ghosts, reasons = run.ghosts["status"] == 0, ghost_reasons(run.ghosts)
     solved = run.windows["solve_stop"] - run.windows["solve_first"]
     kinds, counts = np.unique(run.events["kind"], return_counts=True)
-    shares = ground_by_views(run.views, grid.inside(), len(run.cameras)).tolist()
     return Overview(
         file=str(run.path),
         scene=run.scene,
@@ -76,7 +72,7 @@ def summarise_run(run: Run) -> Overview:
         top=grid.top,
         cell=grid.cell,
         planes=grid.planes,
-        ground_by_views=shares,
+        ground_by_views=ground_by_views(run.views, grid.inside(), len(run.cameras)).tolist(),
         frame_rate=run.frame_rate,
         frames=count,
         first_frame=int(run.frames[0]) if count else None,
@@ -98,7 +94,7 @@ def summarise_run(run: Run) -> Overview:
         seconds_by_stage=seconds_by_stage(run),
         bytes_per_frame=per(size, count),
         bytes=size,
-        warnings=_warnings(run, shares),
+        warnings=run.warnings,
     )
 
 
@@ -130,21 +126,3 @@ def _track_seconds(run: Run) -> dict[str, float]:
     lengths = (run.tracks["last"] - run.tracks["first"] + 1) / run.frame_rate
     points = zip(("shortest", "median", "longest"), np.quantile(lengths, (0, 0.5, 1)).tolist(), strict=True)
     return dict(points)
-
-
-def _warnings(run: Run, shares: list[float]) -> list[str]:
-    if not len(run.frames):
-        return ["there are no frames"]
-    warnings = [] if len(run.tracks) else [_without_tracks(run)]
-    if not run.views.any():
-        warnings.append("no view sees any cell")
-    elif shares[0] > _BLIND_SHARE:
-        warnings.append(f"no view sees {100 * shares[0]:.0f} % of the ground")
-    return warnings + run_warnings(run)
-
-
-def _without_tracks(run: Run) -> str:
-    dropped = int((run.events["kind"] == b"dropped").sum())
-    if not dropped:
-        return "no person was found"
-    return f"all {dropped} tracks were dropped: see /events, and tracking.minimum_duration for short recordings"

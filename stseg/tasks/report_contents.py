@@ -21,7 +21,6 @@ from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, 
 from stseg.reporting.pictures.plan import plan_view
 from stseg.reporting.run_statistics import BUSY_DURATION, Span, busiest_minutes, ground_by_views, people_by_hour
 from stseg.tasks.overview import seconds_by_stage
-from stseg.tasks.warnings import run_warnings
 
 _FLOW = 0.5
 """Side of a square of the map of flow, metres."""
@@ -56,7 +55,7 @@ def page_contents(
         title=run.scene,
         facts=[*_facts(run, span), *_scores(trajectory, truth)],
         answers=answers(span, *counts, ghosts, places, shares),
-        warnings=run_warnings(run),
+        warnings=run.warnings,
         span=span,
         trajectory=trajectory,
         tracks=run.tracks,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
@@ -9,19 +11,25 @@ from stseg.errors import InputError
 from stseg.io.config_file import parse_config
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
+from stseg.reporting.run_statistics import ground_by_views
 from stseg.tasks.sources import body_height, recording_warnings, summarise_sources
 from stseg.view_health.knock_detection import find_knocks, find_residual_step, views_off
 from stseg.view_health.plausibility import scene_warnings, track_warnings
 from stseg.view_health.run_warnings import body_warnings, view_warnings
 
+_BLIND_SHARE = 0.05
+"""Share of the ground that no view sees from which there is a warning."""
 _MOVED = 1.0
 """Least shift of an image that counts as a moved camera, pixels."""
 
 
 def run_warnings(run: Run) -> list[str]:
-    """One sentence for everything that a user should look at."""
+    """One sentence for everything that a user should look at: `Run.warnings`, `stseg inspect`, the report."""
+    if not len(run.frames):
+        return ["there are no frames"]
     body = parse_config(run.provenance.config, f"{run.path}: the configuration").body
     return [
+        *_emptiness(run),
         *source_warnings(run.recording),
         *track_warnings(run.frame_rate, run.trajectory),
         *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
@@ -29,6 +37,19 @@ def run_warnings(run: Run) -> list[str]:
         *rig_warnings(run),
         *crowd_warnings(run.events),
     ]
+
+
+def _emptiness(run: Run) -> Iterator[str]:
+    """Nobody was found, or no view sees the ground."""
+    if not len(run.tracks):
+        dropped = int((run.events["kind"] == b"dropped").sum())
+        remedy = "see /events, and tracking.minimum_duration for short recordings"
+        yield f"all {dropped} tracks were dropped: {remedy}" if dropped else "no person was found"
+    unseen = ground_by_views(run.views, run.recording.rig.grid.inside(), len(run.cameras))[0]
+    if not run.views.any():
+        yield "no view sees any cell"
+    elif unseen > _BLIND_SHARE:
+        yield f"no view sees {100 * unseen:.0f} % of the ground"
 
 
 def source_warnings(recording: Recording) -> list[str]:

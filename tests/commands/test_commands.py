@@ -169,7 +169,7 @@ def test_inspect_on_a_screen(run_path: Path, stdout: Command) -> None:
 
 def test_inspect_warns_of_an_empty_run(tmp_path: Path, stdout: Command) -> None:
     path = write_run(tmp_path / "silent.h5", small_recording(tmp_path), trajectory_of(), np.array([0]), views=0)
-    assert summarise_run(read_run(path)).warnings == ["no person was found", "no view sees any cell"]
+    assert read_run(path).warnings == ["no person was found", "no view sees any cell"]
     assert "warning: no person was found" in stdout("inspect", path)
 
 

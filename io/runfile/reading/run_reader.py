@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -161,6 +162,12 @@ class Run:
         """CANDIDATE (m,) with `parts`: the detections of each frame by itself, ghosts left out."""
         rows: Rows = self.ghosts[self.ghosts["status"] == 1]
         return rows
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """Faults of the recording and the run, one line each, as `stseg inspect` and the report list them."""
+        checks = import_module("stseg.tasks.warnings")  # by name: readers stand below the stages whose checks these are
+        return list(checks.run_warnings(self))
 
     @property
     def volume(self) -> RunVolume:
