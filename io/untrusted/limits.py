@@ -65,6 +65,8 @@ TEXT_FILE = 1 << 24
 """Bytes of a rig, a configuration or a calibration."""
 DETECTIONS_FILE = 1 << 29
 """Bytes of a file of detections that is read whole."""
+MODEL_FILE = (1 << 31) - 1
+"""Bytes of a detector's model: ONNX has no more in one file."""
 UNPACKED = 1 << 26
 """Bytes of an unpacked member of an archive, and of a whole small archive."""
 MEMBERS = 10_000
