@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from stseg.arrays import Ints, Rows
 from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
+from stseg.evaluation.advice import reading_advice
 from stseg.evaluation.alignment import Alignment
 from stseg.evaluation.sequence import Area
 from stseg.io.track_csv import read_tracks_csv
@@ -65,7 +67,10 @@ def evaluate(
     """
     asked_frames = None if frames is None else _frames(frames)
     asked_area = None if area is None else _area(area)
-    scores = score(read_tracks_csv(truth), _read(tracks), gate, asked_area, asked_frames, ignore_flagged, align)
+    rows, trajectory = read_tracks_csv(truth), _read(tracks)
+    scores = score(rows, trajectory, gate, asked_area, asked_frames, ignore_flagged, align)
+    if 2 * scores.hits < scores.truths and (advice := reading_advice(rows, trajectory, gate)):
+        print(f"stseg: warning: {advice}", file=sys.stderr)
     if as_json:
         print(json.dumps(scores.as_dict(), indent=1))
     else:

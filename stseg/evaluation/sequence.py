@@ -123,8 +123,8 @@ def align_frames(
     FormatError
         Where a position is not finite or an id occurs twice in a frame.
     """
-    _check(truth, "truth")
-    _check(trajectory, "tracks")
+    require_rows(truth, "truth")
+    require_rows(trajectory, "tracks")
     numbers = np.unique(truth["frame"] if frames is None else frames)
     truth, trajectory = _rows_of(truth, numbers), _rows_of(trajectory, numbers)
     relevant, evaluated = _inside(truth, area), _inside(trajectory, area)
@@ -155,7 +155,8 @@ def _number(distance_of_frames: list[Floats], person_id: Ints, track_id: Ints) -
     return Sequence(frames, person_frames, track_frames)
 
 
-def _check(rows: Rows, name: str) -> None:
+def require_rows(rows: Rows, name: str) -> None:
+    """Raise FormatError where a position is not finite or an id occurs twice in a frame."""
     lost = ~np.isfinite(_ground(rows)).all(axis=1)
     if lost.any():
         row = rows[lost][0]

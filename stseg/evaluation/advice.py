@@ -1,0 +1,84 @@
+"""The reading of a truth under which tracks would match it: another unit, axes exchanged, frames or ground moved."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stseg.arrays import Rows
+from stseg.errors import FormatError
+from stseg.evaluation.alignment import best_motion, ground_of, moved_rows, number_met, places_by_frame, sampled
+
+_MATCHING, _GAIN = 0.5, 0.3
+"""Least share of the truth's rows that meet tracks under a reading that is named, and least gain over the given one."""
+_UNITS = {"": 1.0, "in millimetres": 1e-3, "in centimetres": 1e-2, "in kilometres": 1e3, "in feet": 0.3048}
+_AXES = {"": (1, 1), "with x negated": (-1, 1), "with y negated": (1, -1), "with x and y exchanged": (1, 1)}
+_PAIRED_ROWS = 500, 20_000
+"""Rows of the truth and of the tracks that are compared in search of an offset in frames."""
+_LEAST_EXTENT = 1.0
+"""Least spread of a truth that was scaled onto the tracks, gates: a truth shrunk to a point meets what stands still."""
+
+
+def reading_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
+    """One sentence that names the reading of a truth that tracks would match; None where the given one does, or none.
+
+    Parameters
+    ----------
+    truth, trajectory
+        As `stseg.evaluation.evaluate` takes them.
+    gate
+        Metres within which a row meets a track.
+    """
+    truth = sampled(truth)
+    if not len(truth) or not len(trajectory):
+        return None
+    tree, given = cKDTree(places_by_frame(trajectory, gate)), 0.0
+    best, words = 0.0, ""
+    for reading, rows in _readings(truth, trajectory, gate):
+        share = number_met(tree, rows, gate) / len(truth)
+        given = given if reading else share
+        if share > best + 1e-9:
+            best, words = share, reading
+    if best < max(_MATCHING, given + _GAIN):
+        return None
+    return f"tracks meet {100 * given:.0f} % of the truth's rows, and {100 * best:.0f} % if the truth is {words}"
+
+
+def _readings(truth: Rows, trajectory: Rows, gate: float) -> Iterator[tuple[str, Rows]]:
+    """The truth as it is given, first and without words, and as other readings have it, the simplest first."""
+    for axes, signs in _AXES.items():
+        for unit, scale in _UNITS.items():
+            rows, ground = truth.copy(), scale * ground_of(truth) * signs
+            rows["x"], rows["y"] = (ground[:, ::-1] if "exchanged" in axes else ground).T
+            yield " ".join(filter(None, (unit, axes))), rows
+    if offset := _offset(truth, trajectory, gate):
+        later = truth.copy()
+        later["frame"] += offset
+        yield f"counted from frame {-offset:+d}", later
+    for axes in ("", "with y negated"):
+        mirrored = truth.copy()
+        mirrored["y"] *= -1 if axes else 1
+        try:
+            motion = best_motion(trajectory, mirrored, gate, "similarity")
+        except FormatError:  # they share no frames
+            return
+        rows = moved_rows(mirrored, motion)
+        turn, scale = math.degrees(cmath.phase(motion.factor)), abs(motion.factor)
+        if ground_of(rows).std(axis=0).max() > _LEAST_EXTENT * gate:
+            moved = f"turned by {round(turn)} degrees, scaled by {scale:.2g} and shifted"
+            yield (f"{axes}, {moved}" if axes else f"{moved} (--align)"), rows
+
+
+def _offset(truth: Rows, trajectory: Rows, gate: float) -> int:
+    """The most frequent number of frames between rows of the truth and tracks at the same place; 0 for none."""
+    few, many = (rows[:: -(-len(rows) // most)] for rows, most in zip((truth, trajectory), _PAIRED_ROWS, strict=True))
+    meetings = cKDTree(ground_of(many)).query_ball_point(ground_of(few), gate)
+    later = np.concatenate(
+        [np.zeros(0, np.int64), *(many["frame"][met] - row["frame"] for met, row in zip(meetings, few, strict=True))]
+    )
+    offsets, counts = np.unique(later, return_counts=True)
+    return int(offsets[counts.argmax()]) if len(counts) else 0

@@ -1,0 +1,79 @@
+"""A truth in another unit, with other axes, frames or ground is named; tracks that are merely bad get no advice."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recordings import data_path
+from scenes import walkers
+
+from stseg.arrays import Rows
+from stseg.commands.main import main
+from stseg.evaluation.advice import reading_advice
+from stseg.io.track_csv import read_tracks_csv, write_tracks_csv
+
+GATE = 0.5
+
+
+@pytest.fixture(params=["walkers", "laboratory/truth.csv", "uu4/reference_tracks.csv"])
+def tracks(request: pytest.FixtureRequest) -> Rows:
+    """Tracks whose truth is known: the truth, one row in five missed."""
+    rows = walkers(40) if request.param == "walkers" else read_tracks_csv(data_path(request.param))
+    return rows[np.random.default_rng(4).random(len(rows)) < 0.8]
+
+
+def moved(rows: Rows, factor: complex, shift: complex = 0, mirrored: bool = False, frames: int = 0) -> Rows:
+    """Rows on another ground, with other frames, and with errors of 5 cm."""
+    chance, changed = np.random.default_rng(3), rows.copy()
+    place = rows["x"] + 1j * rows["y"] + chance.normal(0, 0.05, (len(rows), 2)) @ [1, 1j]
+    place = factor * (place.conj() if mirrored else place) + shift
+    changed["x"], changed["y"], changed["frame"] = place.real, place.imag, rows["frame"] + frames
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("factor", "shift", "mirrored", "frames", "named"),
+    [
+        (1000, 0, False, 0, "in millimetres"),
+        (100, 0, False, 0, "in centimetres"),
+        (0.001, 0, False, 0, "in kilometres"),
+        (1j, 0, True, 0, "with x and y exchanged"),
+        (100j, 0, True, 0, "in centimetres with x and y exchanged"),
+        (1, 0, True, 0, "with y negated"),
+        (-1, 0, True, 0, "with x negated"),
+        (1, 0, False, 1000, r"counted from frame \+1000"),
+        (1, 0, False, -7, "counted from frame -7"),
+        (np.exp(-1j), 3 + 7j, False, 0, r"turned by 5\d degrees, scaled by (1|0\.99) and shifted \(--align\)"),
+        (2 * np.exp(-1j), 3 + 7j, False, 0, r"turned by 5\d degrees, scaled by 0\.5 and shifted \(--align\)"),
+        (1, 9, True, 0, "with y negated, turned by 0 degrees"),
+    ],
+)
+def test_the_reading_that_would_match_is_named(
+    tracks: Rows, factor: complex, shift: complex, mirrored: bool, frames: int, named: str
+) -> None:
+    advice = reading_advice(moved(tracks, factor, shift, mirrored, frames), tracks, GATE)
+    assert advice is not None and re.search(f"if the truth is {named}", advice)
+
+
+def test_what_matches_as_it_is_gets_no_advice(tracks: Rows) -> None:
+    assert reading_advice(moved(tracks, 1), tracks, GATE) is None
+    assert reading_advice(tracks[:0], tracks, GATE) is None
+    assert reading_advice(tracks, tracks[:0], GATE) is None
+
+
+def test_bad_tracks_get_no_advice(tracks: Rows) -> None:
+    chance, strange = np.random.default_rng(1), tracks.copy()
+    low, high = strange["x"].min(), strange["x"].max()
+    steps = chance.normal(0, 0.3, len(strange)).cumsum()
+    strange["x"] = low + np.abs((steps - low) % (2 * (high - low)) - (high - low))
+    strange["y"] = chance.permutation(strange["y"])
+    assert reading_advice(strange, tracks, GATE) is None
+
+
+def test_the_command_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tracks = walkers(40)
+    for name, rows in (("tracks.csv", tracks), ("truth.csv", moved(tracks, 100))):
+        write_tracks_csv(tmp_path / name, rows)
+    assert main(["evaluate", str(tmp_path / "tracks.csv"), str(tmp_path / "truth.csv"), "--json"]) == 0
+    assert "warning: tracks meet 0 % of the truth's rows, and 100 % if the truth is in cent" in capsys.readouterr().err
