@@ -22,7 +22,7 @@ def require_film_name(path: Path) -> None:
 
 
 def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwrite: bool) -> int:
-    """Write pictures as an MP4 file (MPEG-4 part 2), whole or not at all, and count them; raises OutputError.
+    """Write pictures as an MP4 file of VP9, which browsers play, whole or not at all; their number. Raises OutputError.
 
     The pictures are one or more, uint8 (v, u, 3), blue, green, red, all of one size; the path ends in .mp4, and an
     older file is replaced where `overwrite` says so.
@@ -47,7 +47,7 @@ def _write(film: Path, pictures: Iterable[Bytes], frame_rate: float) -> int:
         for picture in pictures:
             size = (picture.shape[1], picture.shape[0])
             if not count and not writer.open(
-                str(film), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), frame_rate, size
+                str(film), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"vp09"), frame_rate, size
             ):
                 raise OutputError(film, "", "a video that cannot be opened", "a place that can be written")
             writer.write(picture)

@@ -21,7 +21,8 @@ from stseg.identities.search.costs import CONTRADICTION
 from stseg.io.config_file import parse_config
 from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.runfile.runs import Run, read_run
-from stseg.reporting.page.review_page import Question, best_views, moment_picture, review_page
+from stseg.reporting.charts import clock_time
+from stseg.reporting.page.review_page import Question, best_views, moment_picture, plan_film, review_page
 from stseg.tasks.correction import answered_before, is_solved_again
 from stseg.tasks.report import read_views
 
@@ -93,7 +94,8 @@ def write_review(run_file: Path, output: Path, *, most: int, camera_images: bool
     frames = sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)})
     views = read_views(run.recording, frames) if camera_images and doubts else {}
     questions = [_question(run, doubt, views) for doubt in doubts]
-    write_page(output, review_page(f"{run.scene}: review", questions, camera_images), overwrite)
+    page = review_page(f"{run.scene}: review", run_file.name, run.recording.rig.grid, questions, camera_images)
+    write_page(output, page, overwrite)
     return len(questions)
 
 
@@ -121,11 +123,18 @@ def _question(run: Run, doubt: Doubt, views: Mapping[int, tuple[Observation, ...
         )
         for view in best_views(rig, ground)
         for words, frame in moments
+        if views
     ]
-    return Question(*_words(doubt), pictures)
+    first, last = moments[0][1] - round(run.frame_rate), moments[2][1] + round(run.frame_rate)
+    film = plan_film(run.trajectory, first, last, run.frame_rate, ids)
+    (x, y), seconds = ground.mean(axis=0), doubt.first / run.frame_rate
+    words, choices = question_words(doubt)
+    at = f"{words} At {clock_time(seconds)}, near ({x:.1f}, {y:.1f})."
+    return Question(at, [*choices, ("0", "cannot tell", "")], pictures, film)
 
 
-def _words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
+def question_words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
+    """A question, and the key, the words and the lines of each of its answers."""
     a, b, frame = doubt.track, doubt.other, (doubt.first + doubt.last + 1) // 2
     keep = f"keep,{frame},{a},{b or ''},"
     if doubt.question == "encounter":
@@ -139,5 +148,6 @@ def _words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
         return f"{b} begins: is it the person who was {a} until then?", [("1", f"no, {a} goes on", keep), swap, other]
     if doubt.question == "gap":
         join = ("2", "the same person", f"join,,{a},{b},")
-        return f"Is {b} the person who was {a}?", [("1", "two people", keep), join]
+        two = ("1", "two people", f"keep,,{a},{b},")  # no frame of a gap is one of a track
+        return f"Is {b} the person who was {a}?", [two, join]
     return f"Is {a} a person?", [("1", "a person", keep), ("2", "no person", f"delete,,{a},,")]

@@ -1,5 +1,6 @@
 """The queue of doubts and its page in a real browser; answers as corrections of a run."""
 
+from dataclasses import astuple
 from pathlib import Path
 
 import h5py
@@ -15,11 +16,12 @@ from stseg.commands.export import export
 from stseg.commands.report import report
 from stseg.commands.review import review
 from stseg.errors import FormatError, InputError
-from stseg.identities.review.corrections import Answer, Corrections, solve_corrections
+from stseg.identities.review.corrections import ACTIONS, Answer, Corrections, solve_corrections
 from stseg.identities.review.doubts import _together, find_doubts
-from stseg.io.answers import read_names
+from stseg.io.answers import read_answers, read_names
 from stseg.io.runfile.runs import read_run
 from stseg.records.tables import TRACK, TRAJECTORY, Tracks
+from stseg.tasks.review import question_words
 
 BORDER = np.array([[-5.0, -5.0], [5.0, 5.0]])
 
@@ -91,18 +93,43 @@ def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys:
     assert "1 questions" in capsys.readouterr().out
     with chromium(tmp_path / "profile") as page:
         page.open(tmp_path / "review.html")
-        page.wait_for("document.querySelector('.item:not([hidden]) img').naturalWidth > 50")
-        assert "Are 1 and 2 after the encounter" in page.ask(
-            "document.querySelector('.item:not([hidden]) h2').textContent"
-        )
+        drawn = page.picture(1280, 900)
+        page.ask("dispatchEvent(new KeyboardEvent('keydown', { key: ' ' })), 0")
+        page.wait_for("document.getElementById('slider').value === document.getElementById('slider').max")
+        assert page.picture(1280, 900) != drawn
+        assert "Are 1 and 2 after the encounter" in page.ask("document.getElementById('question').textContent")
         page.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '2' })), 0")
         text = page.ask("document.getElementById('csv').value")
         assert page.complaints == [] and page.requests == []
+        page.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '0' })), 0")
+        assert page.ask("document.getElementById('csv').value") == "action,frame,id,other,name\n", "cannot tell"
     assert text == "action,frame,id,other,name\nswap,14,1,2,\n"
     (tmp_path / "answers.csv").write_text(text)
     correct(run, tmp_path / "answers.csv", output=tmp_path / "new.h5")
     rows = read_run(tmp_path / "new.h5").trajectory
     assert rows["x"][(rows["frame"] == 15) & (rows["id"] == 2)] == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_answer_to_every_question_is_accepted(tmp_path: Path, seed: int) -> None:
+    """Tracks that begin, end, meet and pass on to others anywhere."""
+    lots = np.random.default_rng(seed)
+    spans = np.sort(lots.integers(0, 120, (25, 2)), axis=1) + np.array([0, 5])
+    rows = np.concatenate(
+        [
+            walk(k + 1, int(first), lots.uniform(-3, 3) + np.cumsum(lots.normal(0, 0.1, last - first + 1)), 0.0, 1.7)
+            for k, (first, last) in enumerate(spans)
+        ]
+    )
+    rows["score"] = lots.uniform(0, 2, len(rows))
+    doubts = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+    assert {one.question for one in doubts} == {"encounter", "gap", "birth", "false"}
+    for doubt in doubts:
+        for _, _, lines in question_words(doubt)[1]:
+            (tmp_path / "a.csv").write_text(f"action,frame,id,other,name\n{lines}\n")
+            answers = [Answer(*astuple(row)) for row in read_answers(tmp_path / "a.csv", ACTIONS)]
+            assert len(answers) == lines.count("\n") + 1
+            solve_corrections(Tracks(rows).summary(), answers)
 
 
 def test_without_tracks_nothing_is_doubted() -> None:

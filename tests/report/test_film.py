@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 import run_files
+from browser import CHROMIUM, chromium
 from refusals import Command, refused
 from scenes import looking
 
@@ -145,3 +146,13 @@ def test_a_rig_of_one_camera_and_of_many_have_films(recording: Recording) -> Non
         assert film.picture(3, (None,) * count).shape == (film.size[1], film.size[0], 3)
         sizes.append(film.size)
     assert sizes[0][0] < sizes[1][0] and sizes[1][0] < 3000
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
+def test_a_browser_plays_the_film(run_path: Path, tmp_path: Path) -> None:
+    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4")]) == 0
+    (tmp_path / "film.html").write_text("<video src='a.mp4' muted></video>")
+    with chromium(tmp_path / "profile") as page:
+        page.open(tmp_path / "film.html")
+        page.wait_for("(v => v.error || v.readyState > 1)(document.querySelector('video'))")
+        assert page.ask("(v => [v.error && v.error.code, v.duration])(document.querySelector('video'))") == [None, 1.2]

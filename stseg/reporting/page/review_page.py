@@ -1,21 +1,29 @@
-"""The page that asks about doubtful identities: pictures of each decision, one key for each answer."""
+"""The page that asks about doubtful identities: a plan of the seconds around each decision, one key for each answer."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import PurePath
+from shlex import quote
 
 import cv2
 import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Observation, Rows
-from stseg.geometry import Camera, Rig
+from stseg.geometry import Camera, Grid, Rig
+from stseg.reporting.charts import clock_time
 from stseg.reporting.figures import backdrop
 from stseg.reporting.page.html import jpeg_uri, page, script_json
+from stseg.reporting.pictures.colours import hex_colour, track_colour
 from stseg.reporting.pictures.overlay import overlay
 
 _WIDTH, _HEIGHT = 960, 260
+_FILM_FRAMES = 80
+"""Moments of the plan's film, at most."""
+_OTHERS = "#b5bac2"
+"""Colour of tracks that are not asked about."""
 _VIEWS = 2
 """Views of each decision."""
 
@@ -30,14 +38,20 @@ class Question:
     """Key, words and line of the answers file of each answer."""
     pictures: Sequence[tuple[str, Bytes]]
     """Caption and picture of each moment and view."""
+    film: dict[str, object]
+    """The tracks of the seconds around, see `plan_film`."""
 
 
-def review_page(title: str, questions: Sequence[Question], shows_images: bool) -> str:
-    """The page's text."""
+def review_page(title: str, run_name: str, grid: Grid, questions: Sequence[Question], shows_images: bool) -> str:
+    """The page's text; `run_name` is the run file's."""
     items = "\n".join(map(_item, questions))
     privacy = "This page shows images from the cameras: share it with care." if shows_images else "No camera image."
-    data = script_json([{"choices": one.choices} for one in questions])
-    body = _BODY.format(title=escape(title), items=items, privacy=privacy)
+    corrected = str(PurePath(run_name).with_suffix(".corrected.h5"))
+    command = f"stseg correct {quote(run_name)} answers.csv -o {quote(corrected)}"
+    border = None if grid.polygon is None else np.asarray(grid.polygon).tolist()
+    asked = [{"text": one.text, "choices": one.choices, "film": one.film} for one in questions]
+    data = script_json({"x": grid.x, "y": grid.y, "polygon": border, "questions": asked})
+    body = _BODY.format(title=escape(title), items=items, privacy=privacy, command=escape(command))
     return page(title, body, data, ("review_page.js",), _STYLE)
 
 
@@ -46,7 +60,20 @@ def _item(question: Question) -> str:
         f'<figure><img alt="{words}" src="{jpeg_uri(picture, 80)}"><figcaption>{words}</figcaption></figure>'
         for words, picture in ((escape(caption), picture) for caption, picture in question.pictures)
     )
-    return f'<section class="item" hidden><h2>{escape(question.text)}</h2><div class="row">{pictures}</div></section>'
+    return f'<div class="item row" hidden>{pictures}</div>'
+
+
+def plan_film(trajectory: Rows, first: int, last: int, frame_rate: float, ids: Sequence[int]) -> dict[str, object]:
+    """Times and places of all tracks from one frame to another, for the script; those of `ids` in their colours."""
+    frames = np.unique(np.linspace(first, last, min(last - first + 1, _FILM_FRAMES)).astype(int))
+    rows = trajectory[np.isin(trajectory["frame"], frames)]
+    tracks = []
+    for identity in np.unique(rows["id"]).tolist():
+        own = rows[rows["id"] == identity]
+        moment, place = np.searchsorted(frames, own["frame"]), np.round(np.stack([own["x"], own["y"]], -1), 2)
+        colour = hex_colour(track_colour(identity)) if identity in ids else _OTHERS
+        tracks.append({"id": identity, "colour": colour, "moment": moment.tolist(), "place": place.tolist()})
+    return {"clock": [clock_time(frame / frame_rate) for frame in frames.tolist()], "tracks": tracks}
 
 
 def best_views(rig: Rig, ground: AnyArray) -> list[int]:
@@ -87,7 +114,12 @@ def _crop(picture: Bytes, camera: Camera, rows: Rows) -> Bytes:
 
 
 _STYLE = """
-main { max-width: none } .row { display: flex; flex-wrap: wrap; gap: 10px } .row figure { margin: 0 }
+main { max-width: none } .row { display: flex; flex-wrap: wrap; gap: 10px; margin: 10px 0 }
+.row[hidden] { display: none } .row figure { margin: 0 }
+.both { display: flex; flex-wrap: wrap; gap: 20px } .both > div { flex: 1 1 420px }
+#plan { width: min(100%, 480px); border: 1px solid var(--rule) }
+#time { display: flex; position: static; background: none; box-shadow: none; border: 0 }
+#time { max-width: 480px; padding: 6px 0 }
 #choices button { margin-right: 12px } #choices .chosen { outline: 3px solid var(--accent) }
 #csv { width: 100%; height: 120px; font-family: monospace }
 """
@@ -95,9 +127,13 @@ main { max-width: none } .row { display: flex; flex-wrap: wrap; gap: 10px } .row
 _BODY = """<main>
 <h1>{title}</h1>
 <p>The most doubtful decision first. A key answers and goes on; arrows move, Backspace takes an answer back.
-{privacy}</p>
-<p><b id="count"></b> <span id="choices"></span> <a id="save" download="answers.csv">Save answers.csv</a></p>
-{items}
+The slider and the space bar play the plan of these seconds; what you cannot tell stays as it is. {privacy}</p>
+<p><b id="count"></b> <span id="choices"></span></p>
+<h2 id="question"></h2>
+<div class="both"><div><canvas id="plan"></canvas>
+<p id="time"><input id="slider" type="range" min="0" value="0" aria-label="time"> <span id="clock"></span></p></div>
+<div>{items}</div></div>
+<p><a id="save" download="answers.csv">Save answers.csv</a></p>
 <textarea id="csv" readonly aria-label="answers.csv"></textarea>
-<p>Then: <code>stseg correct RUN.h5 answers.csv -o corrected.h5</code></p>
+<p>Then: <code>{command}</code></p>
 </main>"""
