@@ -148,6 +148,6 @@ def question_words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
         return f"{b} begins: is it the person who was {a} until then?", [("1", f"no, {a} goes on", keep), swap, other]
     if doubt.question == "gap":
         join = ("2", "the same person", f"join,,{a},{b},")
-        two = ("1", "two people", f"keep,,{a},{b},")  # no frame of a gap is one of a track
-        return f"Is {b} the person who was {a}?", [two, join]
+        apart = ("1", "two people", f"keep,,{a},{b},")  # no frame of a gap is one of a track
+        return f"Is {b} the person who was {a}?", [apart, join]
     return f"Is {a} a person?", [("1", "a person", keep), ("2", "no person", f"delete,,{a},,")]

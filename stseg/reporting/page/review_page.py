@@ -69,8 +69,8 @@ def plan_film(trajectory: Rows, first: int, last: int, frame_rate: float, ids: S
     rows = trajectory[np.isin(trajectory["frame"], frames)]
     tracks = []
     for identity in np.unique(rows["id"]).tolist():
-        own = rows[rows["id"] == identity]
-        moment, place = np.searchsorted(frames, own["frame"]), np.round(np.stack([own["x"], own["y"]], -1), 2)
+        path = rows[rows["id"] == identity]
+        moment, place = np.searchsorted(frames, path["frame"]), np.round(np.stack([path["x"], path["y"]], -1), 2)
         colour = hex_colour(track_colour(identity)) if identity in ids else _OTHERS
         tracks.append({"id": identity, "colour": colour, "moment": moment.tolist(), "place": place.tolist()})
     return {"clock": [clock_time(frame / frame_rate) for frame in frames.tolist()], "tracks": tracks}
