@@ -147,7 +147,7 @@ def question_words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
         other = ("3", f"{a} is somebody else from then on", f"split,{doubt.last},{a},,")
         return f"{b} begins: is it the person who was {a} until then?", [("1", f"no, {a} goes on", keep), swap, other]
     if doubt.question == "gap":
+        keep = f"keep,,{a},{b},"  # no frame of a gap is one of a track
         join = ("2", "the same person", f"join,,{a},{b},")
-        apart = ("1", "two people", f"keep,,{a},{b},")  # no frame of a gap is one of a track
-        return f"Is {b} the person who was {a}?", [apart, join]
+        return f"Is {b} the person who was {a}?", [("1", "two people", keep), join]
     return f"Is {a} a person?", [("1", "a person", keep), ("2", "no person", f"delete,,{a},,")]

@@ -49,8 +49,8 @@ def review_page(title: str, run_name: str, grid: Grid, questions: Sequence[Quest
     corrected = str(PurePath(run_name).with_suffix(".corrected.h5"))
     command = f"stseg correct {quote(run_name)} answers.csv -o {quote(corrected)}"
     border = None if grid.polygon is None else np.asarray(grid.polygon).tolist()
-    asked = [{"text": one.text, "choices": one.choices, "film": one.film} for one in questions]
-    data = script_json({"x": grid.x, "y": grid.y, "polygon": border, "questions": asked})
+    question_data = [{"text": one.text, "choices": one.choices, "film": one.film} for one in questions]
+    data = script_json({"x": grid.x, "y": grid.y, "polygon": border, "questions": question_data})
     body = _BODY.format(title=escape(title), items=items, privacy=privacy, command=escape(command))
     return page(title, body, data, ("review_page.js",), _STYLE)
 
