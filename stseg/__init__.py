@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from stseg.tasks.calibration.check import check_rig
     from stseg.tasks.calibration.points import calibrate_points
     from stseg.tasks.correction import correct
+    from stseg.tasks.detection import detect
     from stseg.tasks.forecast import plan
     from stseg.tasks.measures import measure
     from stseg.tasks.pixel_labels import label_images
@@ -70,6 +71,7 @@ __all__ = [
     "calibrate_points",
     "check_rig",
     "correct",
+    "detect",
     "evaluate",
     "label_images",
     "measure",
@@ -104,6 +106,7 @@ _HOMES = {
     "stseg.tasks.calibration.check": ("check_rig",),
     "stseg.tasks.calibration.points": ("calibrate_points",),
     "stseg.tasks.correction": ("correct",),
+    "stseg.tasks.detection": ("detect",),
     "stseg.tasks.forecast": ("plan",),
     "stseg.tasks.measures": ("measure",),
     "stseg.tasks.pixel_labels": ("label_images",),

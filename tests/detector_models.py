@@ -39,9 +39,10 @@ class Graph:
         outputs: dict[str, tuple[int, ...]],
         metadata: dict[str, str] | None = None,
         more_inputs: tuple[onnx.ValueInfoProto, ...] = (),
+        size: tuple[int, int] = (WIDTH, HEIGHT),
     ) -> Path:
         """The model, with float outputs of these names and shapes."""
-        picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, HEIGHT, WIDTH])
+        picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, *size[::-1]])
         results = [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in outputs.items()]
         graph = helper.make_graph(self.nodes, "detector", [picture, *more_inputs], results, self.constants)
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
@@ -210,3 +211,27 @@ MODELS = {
     "RT-DETR": (rtdetr, rtdetr_single),
 }
 """Models of each layout by its name."""
+
+
+def one_person(path: Path, size: tuple[int, int]) -> Path:
+    """A model with suppression inside that finds one box: around all red pixels of a picture of `size`."""
+    width, height = size
+    graph = Graph()
+    weights = np.array([1, -1, 0]).reshape(1, 3, 1, 1)
+    red = graph.node("Sub", graph.node("Conv", "images", graph.constant(weights)), graph.constant(0.3))
+    flags = graph.node("Clip", graph.node("Mul", red, graph.constant(1e4)), graph.constant(0.0), graph.constant(1.0))
+    edges = []
+    for axis, length in ((3, width), (2, height)):
+        line = graph.node("ReduceMax", flags, axes=[5 - axis], keepdims=0)
+        steps = np.arange(length).reshape(1, 1, length)
+        first, last = (
+            graph.node("ReduceMax", graph.node("Mul", line, graph.constant(weight)), axes=[2], keepdims=1)
+            for weight in (length - steps, steps + 1)
+        )
+        edges.append((graph.node("Sub", graph.constant(np.full((1, 1, 1), length)), first), last))
+    score = graph.node("ReduceMax", flags, axes=[2, 3], keepdims=0)
+    score = graph.node("Reshape", score, graph.constant([1, 1, 1], np.int64))
+    (left, right), (top, bottom) = edges
+    zero = graph.constant(np.zeros((1, 1, 1)))
+    graph.node("Concat", left, top, right, bottom, score, zero, output="o", axis=2)
+    return graph.saved(path, {"o": (1, 1, 6)}, size=size)

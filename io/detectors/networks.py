@@ -43,6 +43,8 @@ class Network:
         Inputs, outputs and metadata in the file.
     size
         Width and height of the picture, pixels.
+    runtime
+        The library that runs it, and its version.
     """
 
     def __init__(self, path: Path, by_opencv: bool | None = None) -> None:
@@ -54,10 +56,8 @@ class Network:
             raise FormatError(path, "", f"what is no ONNX ({error})", _MODEL) from error
         self.size = self._size()
         self._elements = [one.element for one in self.header.inputs]
-        if by_opencv is None:
-            by_opencv = find_spec("onnxruntime") is None
-        self.runtime = f"OpenCV {cv2.__version__}" if by_opencv else f"onnxruntime {_onnxruntime().__version__}"
-        """The library that runs it, and its version."""
+        by_opencv = _by_opencv() if by_opencv is None else by_opencv
+        self.runtime = runtime(by_opencv)
         self._run = self._by_opencv(data) if by_opencv else self._by_onnxruntime(data)
 
     def __call__(self, picture: Singles) -> dict[str, Floats]:
@@ -119,6 +119,16 @@ class Network:
     def _refused(self, error: Exception) -> FormatError:
         reason = " ".join(str(error).split())[:160]
         return FormatError(self.path, "", f"what {self.runtime} does not run ({reason})", _MODEL)
+
+
+def runtime(by_opencv: bool | None = None) -> str:
+    """The library that runs networks (see `Network`), and its version."""
+    by_opencv = _by_opencv() if by_opencv is None else by_opencv
+    return f"OpenCV {cv2.__version__}" if by_opencv else f"onnxruntime {_onnxruntime().__version__}"
+
+
+def _by_opencv() -> bool:
+    return find_spec("onnxruntime") is None
 
 
 def describe(header: OnnxHeader) -> str:

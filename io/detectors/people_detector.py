@@ -18,6 +18,7 @@ from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import one_of
 
 PERSON = "person"
+_LEAST_SCORE = 0.25
 _OVERLAP = 0.6
 """Intersection over union of two boxes from which on they are one person's."""
 _CANDIDATES = 3000
@@ -36,16 +37,20 @@ class OnnxDetector:
     classes
         Names or numbers of the wanted classes; a model without names has people as class 0.
     least_score
-        Boxes of lower score are left out.
+        Boxes of lower score are left out; None for 0.25.
     by_opencv
         See `Network`.
     """
 
     def __init__(
-        self, path: Path, classes: Sequence[str] = (PERSON,), least_score: float = 0.25, by_opencv: bool | None = None
+        self,
+        path: Path,
+        classes: Sequence[str] = (PERSON,),
+        least_score: float | None = None,
+        by_opencv: bool | None = None,
     ) -> None:
         self._network = Network(path, by_opencv)
-        self._least = least_score
+        self._least = _LEAST_SCORE if least_score is None else least_score
         grey = np.full((*self._network.size[::-1], 3), 114, np.uint8)
         outputs = self._network(_as_input(grey, True, 1.0))
         layout = recognise(outputs, self._network.size)

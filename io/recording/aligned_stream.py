@@ -11,7 +11,7 @@ import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -189,8 +189,17 @@ def index_streams(recording: Recording) -> StreamIndex:
     with ExitStack() as opened:
         streams = open_aligned_streams(recording, opened)
         pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))
-        times = tuple(counted.result() for counted in [pool.submit(stream.read_times) for stream in streams])
+        times = tuple(counted.result() for counted in [pool.submit(_read_times, stream) for stream in streams])
         return index_from_times(recording, times, streams)
+
+
+def _read_times(stream: AlignedStream) -> tuple[Floats, ...]:
+    """The time stamps of a stream, or of the images beside it where those count, milliseconds."""
+    timed = stream.source.timed
+    if timed is stream.source.source:
+        return stream.read_times()
+    with closing(open_stream(timed, stream.camera)) as images:
+        return tuple(images.times())
 
 
 def index_from_times(

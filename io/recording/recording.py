@@ -14,6 +14,8 @@ from stseg.geometry.rig import greatest_reduction
 SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
 ClockSource = Literal["auto", "stamps", "count"]
 SOURCE_KINDS: tuple[SourceKind, ...] = ("video", "masks", "images", "instances", "boxes")
+HOG = Path("hog")
+"""The detector that needs no file (`stseg.io.detectors.hog`)."""
 _PASSWORD = re.compile(r"(://[^/\s:@\"]*):[^/\s\"]*@")
 
 
@@ -55,6 +57,9 @@ class Source:
         boxes only: pairs of our name and a CSV or Parquet file's name of a column.
     appearance
         boxes only: .npy file of appearance features, one row a detection in the order of the detections; None without.
+    detector
+        video and images only: a model in ONNX that finds people in them, or `HOG`; None for a run from pixels.
+        `classes` and `least_score` are then those of the detector.
     """
 
     kind: SourceKind
@@ -71,6 +76,11 @@ class Source:
     image_list: Path | None = None
     columns: tuple[tuple[str, str], ...] = ()
     appearance: Path | None = None
+    detector: Path | None = None
+
+    def without_detector(self) -> Source:
+        """The frames alone."""
+        return replace(self, detector=None, classes=(), least_score=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +103,13 @@ class CameraSource:
     frame_at_tick: Ints | None = field(default=None, compare=False, repr=False)
     """int64 (tick,): the camera's own frame shown at each tick, -1 where it is blind; None where frame k is shown at
     tick k, or before alignment."""
+
+    @property
+    def timed(self) -> Source:
+        """The stream that has the time stamps: the images beside boxes where `clock` is "stamps", else the source."""
+        if self.source.kind == "boxes" and self.clock == "stamps" and self.images is not None:
+            return self.images
+        return self.source
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,9 +161,12 @@ class Recording:
         return replace(self, reduction=tuple(self._factor(camera, feed, rows) for camera, feed in cameras))
 
     def pictured(self) -> Recording:
-        """The recording with its cameras' colour frames in place of boxes, where `images` gives them."""
+        """The recording with its cameras' colour frames in place of boxes, where `images` or a detector's video is."""
         sources = (
-            feed if feed.images is None else replace(feed, source=feed.images, images=None) for feed in self.sources
+            replace(feed, source=(feed.images or feed.source).without_detector(), images=None)
+            if feed.images is not None or feed.source.detector is not None
+            else feed
+            for feed in self.sources
         )
         return replace(self, sources=tuple(sources))
 

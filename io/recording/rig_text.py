@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera
-from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source
+from stseg.io.recording.recording import HOG, BodyPrior, CameraSource, Recording, Source
 from stseg.io.toml import toml_string, toml_value
 
 FORMAT = 1
@@ -95,6 +95,7 @@ def _source_text(source: Source, folder: Path) -> str:
         "select": source.select or None,
         "image_list": relative(source.image_list),
         "appearance": relative(source.appearance),
+        "detector": str(HOG) if source.detector == HOG else relative(source.detector),
         "columns": dict(source.columns) or None,
         "starts": [float(start) for start in source.starts] or None,
     }

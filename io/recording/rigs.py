@@ -19,6 +19,7 @@ from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.io.detections.tables import COLUMNS
 from stseg.io.outputs.whole_files import MARK, Inputs, require_output, write_file
 from stseg.io.recording.recording import (
+    HOG,
     SOURCE_KINDS,
     BodyPrior,
     CameraSource,
@@ -39,6 +40,7 @@ _CAMERA_KEYS = (
     *("name", "size", "ground", "vertical", "projection", "lens"),
     *("offset", "source", "images", "background", "on_missing", "clock"),
 )
+_DETECTOR_KEYS = ("detector", "classes", "score")
 _DETECTION_KEYS = ("first_frame", "frames", "classes", "score", "view", "select", "image_list", "columns", "appearance")
 
 
@@ -245,7 +247,9 @@ def _camera_source(table: Table) -> CameraSource:
 def _source(table: Table, *more_keys: str) -> Source:
     kind = table.choice("kind", SOURCE_KINDS)
     detections = kind in ("boxes", "instances")
-    table.allow("kind", "path", *(_DETECTION_KEYS if detections else ()), *(() if kind == "boxes" else more_keys))
+    keys = _DETECTION_KEYS if detections else _DETECTOR_KEYS if kind in ("video", "images") and more_keys else ()
+    table.allow("kind", "path", *keys, *(() if kind == "boxes" else more_keys))
+    detector = _detector(table) if "detector" in table else None
     paths = table.paths("path")
     if any("://" in name for name in paths):
         return _live_source(table, kind)
@@ -266,7 +270,17 @@ def _source(table: Table, *more_keys: str) -> Source:
         image_list=table.file.parent / table.text("image_list") if "image_list" in table else None,
         columns=_columns(table.table("columns")) if "columns" in table else (),
         appearance=table.file.parent / table.text("appearance") if "appearance" in table else None,
+        detector=detector,
     )
+
+
+def _detector(table: Table) -> Path:
+    """The model of a detector, or the one that needs no file."""
+    if "starts" in table or any("://" in name for name in table.paths("path")):
+        found = "a detector of files with gaps between them" if "starts" in table else "a detector of a live stream"
+        raise table.error("detector", found, "files that follow one another, or no detector")
+    name = table.text("detector")
+    return HOG if name == str(HOG) else table.file.parent / name
 
 
 def _share(table: Table, name: str) -> float:

@@ -10,7 +10,7 @@ from itertools import islice, pairwise
 from pathlib import Path
 
 from stseg.errors import SourceError
-from stseg.io.recording.recording import Recording, Source
+from stseg.io.recording.recording import HOG, Recording, Source
 
 _SUFFIXES = frozenset((".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"))
 _NUMBER = re.compile(r"(\d+)", re.ASCII)
@@ -37,7 +37,8 @@ def source_files(source: Source) -> Iterator[Path]:
             yield from islice(class_lists(part.path), 1)
         else:
             yield from image_paths(part.path, "")
-    yield from (path for path in (source.image_list, source.appearance) if path is not None)
+    others = (source.image_list, source.appearance, None if source.detector == HOG else source.detector)
+    yield from (path for path in others if path is not None)
 
 
 def recording_files(recording: Recording) -> Iterator[Path]:

@@ -167,6 +167,9 @@ def open_stream(
         raise SourceError(
             mask_passwords(source.address), f"camera {camera.name}", "a live stream", "files; or stseg run --follow"
         )
+    if source.detector is not None:
+        expected = "boxes: stseg detect makes them, and a rig file with them; stseg run makes its own"
+        raise SourceError(source.path, f"camera {camera.name}, detector", "a video without its boxes", expected)
     parts = source_parts(source, f"camera {camera.name}")
     if len(parts) > 1:
         return JoinedStream(parts, camera, times, factor)

@@ -156,7 +156,7 @@ def frame_coverage(recording: Recording, counts: Sequence[int], length: int) -> 
 
 
 def _camera_times(name: str, source: CameraSource, times: Sequence[Floats], rate: float) -> _CameraTimes:
-    paths = [part.path for part in source_parts(source.source, f"camera {name}")]
+    paths = [part.path for part in source_parts(source.timed, f"camera {name}")]
     require_starts(source.source.starts, len(paths), source.source.path, f"camera {name}, source.starts")
     starts = np.array(source.source.starts, float)
     counted = concatenate_files([np.arange(float(len(stamps))) for stamps in times], 1.0, rate, paths, starts)

@@ -139,12 +139,14 @@ def run_request(recording: Recording, provenance: Provenance) -> dict[str, Any]:
         "config": parse_toml(provenance.config),
         "rig": rig,
         "source": sources,
-        "samples of source": {f"{name}, {role}": _samples(source) for name, role, source in _streams(recording)},
+        "samples of source": {
+            f"{name}, {role}": sampled_checksum(source) for name, role, source in _streams(recording)
+        },
         "version": dict(provenance.versions),
     }
 
 
-def _samples(source: Source) -> str:
+def sampled_checksum(source: Source) -> str:
     """Checksum of all files' names, sizes and times, and of beginnings, middles and ends of some of them."""
     digest = blake2b(digest_size=16)
     try:

@@ -25,6 +25,7 @@ from stseg.version import __version__
 
 COMMANDS = {
     "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
+    "detect": ("stseg.commands.detect:detect", "Find people in videos: boxes, and a rig file with them."),
     "run": ("stseg.commands.run:run", "Track the people of a recording."),
     "inspect": ("stseg.commands.inspect:inspect", "Summarise a run file, or the sources of a rig file."),
     "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),

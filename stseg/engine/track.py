@@ -12,6 +12,7 @@ from tempfile import mkdtemp
 from stseg.config import Config
 from stseg.config.keys import require_effect
 from stseg.engine.offline.assembly import FinishedSegment, assemble
+from stseg.engine.offline.detected_boxes import with_boxes
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.known import digest, read_known
@@ -149,6 +150,8 @@ def track_recording(
     """
     require_effect(config, tracker)
     config = with_body_of(recording, config)
+    boxes = output.with_name(f"{output.name}.boxes")
+    recording = with_boxes(recording, boxes, reporter, overwrite)
     people = NO_KNOWN_PEOPLE if known is None else read_known(known, config)
     request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}

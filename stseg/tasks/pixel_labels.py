@@ -92,7 +92,8 @@ def label_images(
 
 def require_pixels(recording: Recording) -> list[int]:
     """The cameras that deliver pixels; SourceError where none does."""
-    found = [k for k, source in enumerate(recording.sources) if source.source.kind != "boxes"]
+    sources = [feed.source for feed in recording.sources]
+    found = [k for k, source in enumerate(sources) if source.kind != "boxes" and source.detector is None]
     if not found:
         raise SourceError(recording.path, "camera, source", "boxes alone", "a camera that delivers pixels")
     return found

@@ -65,7 +65,7 @@ def read_stream_times(path: Path, recording: Recording) -> StreamIndex | None:
         times = tuple(tuple(_stamps(stored, k, one)) for k, one in enumerate(_counts(stored)))
     except (OSError, ValueError):
         return None
-    expected = [len(source_parts(source.source, "")) for source in recording.sources]
+    expected = [len(source_parts(source.timed, "")) for source in recording.sources]
     return index_from_times(recording, times) if list(map(len, times)) == expected else None
 
 
