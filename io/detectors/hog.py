@@ -134,8 +134,8 @@ def _blocks(directions: Singles) -> Singles:
 def _cell_weights() -> Singles:
     """Weights of a block's pixels in its two cells, float32 (half and cell, pixel): less far from either's middle."""
     place = np.arange(2 * _CELL)
-    near = np.maximum(1 - np.abs((place + 0.5) / _CELL - 0.5 - np.arange(2)[:, None]), 0)
-    weights = near * np.exp(-((place - _CELL) ** 2) / 32)
+    share = np.maximum(1 - np.abs((place + 0.5) / _CELL - 0.5 - np.arange(2)[:, None]), 0)
+    weights = share * np.exp(-((place - _CELL) ** 2) / 32)
     return np.asarray(weights.reshape(2, 2, _CELL).transpose(1, 0, 2).reshape(4, _CELL), np.float32)
 
 
