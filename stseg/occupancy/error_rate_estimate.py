@@ -130,7 +130,7 @@ def fill_counts(
     views, sums
         The views' terms, and their sums.
     inside : bool (n,), number : float64 (n,)
-        Whether the pillar of the person near it fills each cell, and cells that it stands for.
+        Whether the pillar of the person near it fills each cell, and cells that it stands for where none is near.
     trusted : bool (view, person)
         Persons supported by the rest of the evidence, and not hidden from the view.
     rates : float64 (view, 3)
@@ -146,6 +146,8 @@ def fill_counts(
     for c in range(len(views.near_person)):
         if views.near_person[c] >= 0:
             _count_beside_person(views, c, inside[c], trusted, rates, errors, trials)
+            continue
+        if number[c] == 0.0:
             continue
         if last < 0 or number[c] != number[last] or not _are_seen_alike(views, c, last):
             last = c

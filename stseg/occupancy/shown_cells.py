@@ -29,6 +29,8 @@ _NEARLY_ALL = 0.75
 """Share of blocks from which all are taken: to list cells anew in each frame would cost more than to fuse the rest."""
 _MOST_PIXELS = 1 << 20
 """Pixels up to which a sum of levels fits into 32 bits; blocks with more are taken to show something."""
+_MOST_COUNTED = 1 << 17
+"""Cells (n,) of which each stands for itself; of more, every second, third, ... stands for those that follow it."""
 _CODE_VIEWS = 60
 """Number of views with sets that one whole number codes."""
 
@@ -73,7 +75,7 @@ class ShownCells(NamedTuple):
     near_person : int32 (n + k,)
         The person near each, -1 for none.
     number : float64 (n + k,)
-        Cells that each stands for.
+        Cells that each stands for where some are counted for all: 0 for those that are left out.
     """
 
     cell: Labels
@@ -158,8 +160,15 @@ class CellTables:
         start = np.append(np.flatnonzero(np.diff(block[:count], prepend=-1)), count).astype(np.int32)
         seen_by = np.concatenate([sets.seen_by[view_set[:count]], sets.seen_by])
         unseen = np.where(np.ascontiguousarray(seen_by.T), np.int16(0), np.int16(UNSEEN))
-        number = np.concatenate([np.ones(count), others])
+        number = np.concatenate([_sampled(count), others])
         return _MarkedCells(marked.copy(), cell[:count], place[:count], block[start[:-1]], start, unseen, number)
+
+
+def _sampled(count: int) -> Floats:
+    """How many of `count` cells, neighbours in their order, each stands for; neighbours mostly show the same pixels."""
+    stride, number = 1 + count // _MOST_COUNTED, np.zeros(count)
+    number[::stride] = stride
+    return number
 
 
 @kernel

@@ -210,7 +210,7 @@ def scene(seed: int) -> tuple[Singles, Shorts]:
     return rasters, np.concatenate(parts)
 
 
-def by_definition(rasters: Singles, owner: Shorts) -> Floats:
+def by_definition(rasters: Singles, owner: Shorts, before: float) -> Floats:
     """Sums over all views of the mean log-odds of open pixels over each outline, (height, cell)."""
     outlines, mean, start = LATTICE.outlines, np.zeros((4, 3 * CELLS)), 0
     for view, (rows, columns) in enumerate(LATTICE.shapes.tolist()):
@@ -222,12 +222,12 @@ def by_definition(rasters: Singles, owner: Shorts) -> Floats:
             spans = outlines.spans[outlines.start[i] : outlines.start[i + 1]]
             total = sum(is_shown[outlines.first[i] + k, a:b].sum() for k, (a, b) in enumerate(spans.tolist()))
             mean[view, pillar] = total / outlines.area[i] if len(spans) else 0.0
-    return np.asarray(SCORE_BEFORE + WEIGHT * mean.sum(0).reshape(CELLS, 3).T)
+    return np.asarray(before + WEIGHT * mean.sum(0).reshape(CELLS, 3).T)
 
 
-def scores(rasters: Singles, owner: Shorts, minimum_probe_score: float) -> Floats:
+def scores(rasters: Singles, owner: Shorts, minimum_probe_score: float, before: float = SCORE_BEFORE) -> Floats:
     extremes = np.tile([rasters.min(), rasters.max()], (4, 1)).astype(float)
-    score = np.full((3, CELLS), SCORE_BEFORE)
+    score = np.full((3, CELLS), before)
     pixels = UnexplainedPixels.of(rasters, owner, LATTICE, extremes)
     fill_scores(pixels, LATTICE, np.array([1]), np.array([0, 2]), minimum_probe_score, WEIGHT, score)
     return score
@@ -235,15 +235,18 @@ def scores(rasters: Singles, owner: Shorts, minimum_probe_score: float) -> Float
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("minimum_probe_score", [-np.inf, -1.0])
-def test_scores_by_definition_where_they_matter(seed: int, minimum_probe_score: float) -> None:
-    found, expected = scores(*scene(seed), minimum_probe_score), by_definition(*scene(seed))
+@pytest.mark.parametrize("before", [SCORE_BEFORE, 3.0])
+def test_scores_by_definition_where_they_matter(seed: int, minimum_probe_score: float, before: float) -> None:
+    """A cell matters where one of its heights scores above 0."""
+    found, expected = scores(*scene(seed), minimum_probe_score, before), by_definition(*scene(seed), before)
     is_evaluated = np.isfinite(found)
     np.testing.assert_allclose(found[is_evaluated], expected[is_evaluated], atol=1e-9)
-    worth = expected[1] > minimum_probe_score
-    assert is_evaluated[1, worth].all()
+    worth, matters = expected[1] > minimum_probe_score, (expected > 0).any(0)
+    assert is_evaluated[1, worth & matters].all()
     assert is_evaluated[:, worth][expected[:, worth] > 0].all()
     assert not is_evaluated[::2, ~worth].any()
-    assert (expected > 0).any()
+    assert matters.any()
+    assert is_evaluated.any(0).mean() < 1.0
 
 
 def test_whatever_is_shown_is_noticed() -> None:

@@ -17,7 +17,9 @@ from stseg.config import ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
+from stseg.occupancy import shown_cells
 from stseg.occupancy.error_rate_estimate import (
+    CLUTTER,
     MISS,
     NEAR_CLUTTER,
     ErrorRateEstimate,
@@ -76,6 +78,19 @@ def test_counts_by_definition(seed: int) -> None:
     # Of equal weights the mean over a_i times the count is their sum, as in the definition.
     expected = reference.counts(shown, 1, near, inside, trusted, rates, 0.6, PRIOR)
     np.testing.assert_allclose(teach(1, shown, near, inside, trusted, rates, 0.6), expected, rtol=1e-3, atol=1e-6)
+
+
+def test_rates_of_some_cells_are_those_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a large ground one cell stands for those that follow it."""
+    seen, found = frame("pixels", 0), []
+    for most in (1 << 17, 30):
+        monkeypatch.setattr(shown_cells, "_MOST_COUNTED", most)
+        fusion = occupancy("pixels")
+        rates = fusion.new_error_rates()
+        fusion.fuse_and_learn(rates, *seen)
+        found.append(rates.counts.sums[:, :, CLUTTER])
+    np.testing.assert_allclose(found[1], found[0], rtol=0.3)
+    assert (found[1] != found[0]).any()
 
 
 def test_rates_are_found() -> None:

@@ -32,13 +32,17 @@ def fill_scores(
     """Add the evidence of unexplained pixels to the score (height, cell) of pillars, nats; -inf where it cannot matter.
 
     Where all `probes` (heights) of a cell score at most `minimum_probe_score`, all its heights are -inf, without
-    evaluating the `others`; so are other heights that score 0 or less.
+    evaluating the `others`; so are other heights that score 0 or less, and cells where all heights do by all that
+    pixels may add.
     """
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
     more, parts = np.empty((2, len(every_pillar.shapes)))
     for cell in range(score.shape[1]):
         best = -np.inf
         fill_around(cell, pixels, lattice, more)
+        if not _may_gain(cell, pixels, lattice, weight, score, more):
+            score[:, cell] = -np.inf
+            continue
         for height in probes:
             pillar = cell * len(score) + height
             score[height, cell] = add_pillar_evidence(
@@ -52,6 +56,27 @@ def fill_scores(
                 if best > minimum_probe_score
                 else -np.inf
             )
+
+
+@part
+def _may_gain(
+    cell: int, pixels: UnexplainedPixels, lattice: PixelLattice, weight: float, score: Floats, more: Floats
+) -> bool:
+    """Whether any height of a cell may score above 0; `more` is that of `fill_around`.
+
+    A view adds at most the log-odds above 0 around the cell that no member explains, and at most the lowest log-odds
+    of all that lies on the raster, with the excess.
+    """
+    before, added = -np.inf, _ROUNDING_MARGIN
+    for height in range(len(score)):
+        before = max(before, score[height, cell])
+    for view in range(len(more)):
+        is_open = pixels.is_open[view, cell // STRIP_CELLS] and lattice.boxes[view, cell, 2] > 0
+        gain = more_inside(view, cell, lattice.boxes[view], pixels.gain_above) if is_open else np.int32(0)
+        least = lattice.inside_share[view, cell] * pixels.extremes[view, 0]
+        share = lattice.pixel_share[view, cell]
+        added += min(least + more[view] * share, gain * (1 / QUANTA_PER_NAT) * share)
+    return bool(before + weight * added > 0)
 
 
 @part

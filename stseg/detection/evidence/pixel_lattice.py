@@ -29,12 +29,18 @@ class PixelLattice(NamedTuple):
     """int16 (view, cell, 4): left, top, right, bottom of the box around the outlines of all heights, raster pixels."""
     strips: Shorts
     """int16 (view, strip, 4): the same around the outlines of a strip's cells."""
+    inside_share: Floats
+    """float64 (view, cell): the least share of a height's outline that lies on the raster."""
+    pixel_share: Floats
+    """float64 (view, cell): the greatest share of one pixel in a height's outline; 0 where the view sees none."""
     shapes: Ints
     """int64 (view, 2): rows and columns of the rasters."""
     owner: Shorts
     """int16 (view, v * u): owners of the pixels of rasters, -1, but while a search uses them."""
     above: Labels
     """Scratch of `stseg.detection.evidence.unexplained_pixels`, allocated once."""
+    gain_above: Labels
+    """Scratch of the same, allocated once."""
     left_of: Floats
     """Scratch of the same, allocated once."""
 
@@ -49,9 +55,16 @@ class PixelLattice(NamedTuple):
         _fill_boxes(outlines, len(body.heights), len(lattice_ground), boxes, strips)
         shapes = np.array([view.shape for view in chosen], np.int64).reshape(-1, 2)
         rows, columns = shapes.max(0, initial=0)
-        above = np.empty((len(chosen), rows + 1, columns + 1), np.int32)
+        above, gain_above = np.empty((2, len(chosen), rows + 1, columns + 1), np.int32)
         owner = np.full((len(chosen), rows * columns), -1, np.int16)
-        return cls(outlines, boxes, strips, shapes, owner, above, np.empty((len(chosen), rows, columns + 1)))
+        left_of = np.empty((len(chosen), rows, columns + 1))
+        per_cell = (len(chosen), len(lattice_ground), len(body.heights))
+        pixel_share = np.where(outlines.inside > 0, 1 / np.maximum(outlines.area, 1), 0.0)
+        inside_share = (outlines.inside * pixel_share).reshape(per_cell).min(2)
+        return cls(
+            outlines, boxes, strips, inside_share, pixel_share.reshape(per_cell).max(2), shapes, owner, above,
+            gain_above, left_of,
+        )  # fmt: skip
 
 
 def _drawn(

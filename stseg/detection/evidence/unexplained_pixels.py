@@ -2,6 +2,8 @@
 
 Most of a view is certain background: its pixels all have the raster's lowest log-odds. So the excess of pixels over
 the lowest is summed, and a strip of the lattice's cells is skipped where the box around its outlines has no excess.
+What pixels may add to a score is at most the sum of those that are rather foreground: once people are explained, few
+are left, and most cells have none around them.
 """
 
 from __future__ import annotations
@@ -36,54 +38,65 @@ class UnexplainedPixels(NamedTuple):
     above: Labels
     """int32 (view, v + 1, u + 1): sums of the excess of pixels above and to the left over the lowest, in quanta and
     rounded up. It is at least one quantum of each that is explained, or is not the lowest."""
+    gain_above: Labels
+    """int32 (view, v + 1, u + 1): sums like `above` of the log-odds above 0 of pixels that no member explains."""
     is_shown: Flags
     """bool (view, strip): whether the box of a strip has any excess."""
+    is_open: Flags
+    """bool (view, strip): whether the box of a strip has a pixel with log-odds above 0 that no member explains."""
     extremes: Floats
     """float64 (view, 2): the lowest and the highest log-odds, nats."""
 
     @classmethod
     def of(cls, rasters: Singles, owners: Shorts, lattice: PixelLattice, extremes: Floats) -> Self:
         """From the log-odds of all pixels, float32 (view, v, u), and the members who explain them, int16 (pixel,)."""
-        number, is_shown = lattice.shapes.prod(1), np.empty(lattice.strips.shape[:2], bool)
+        number, (is_shown, is_open) = lattice.shapes.prod(1), np.empty((2, *lattice.strips.shape[:2]), bool)
         summed_to = np.zeros(rasters.shape[:2], np.uint64)
         pixels = cls(
-            rasters, owners, number.cumsum() - number, lattice.left_of, summed_to, lattice.above, is_shown, extremes
-        )
+            rasters, owners, number.cumsum() - number, lattice.left_of, summed_to, lattice.above, lattice.gain_above,
+            is_shown, is_open, extremes,
+        )  # fmt: skip
         _fill_above(pixels, lattice.shapes, lattice.strips)
         return pixels
 
 
 @kernel
 def _fill_above(pixels: UnexplainedPixels, shapes: Ints, strips: Shorts) -> None:
-    """Fill above and is_shown, and the sums of no pixels; see `UnexplainedPixels`."""
-    more = np.empty(pixels.raster.shape[2], np.int32)
+    """Fill the sums above and what strips show, and the sums of no pixels; see `UnexplainedPixels`."""
+    more, gain = np.empty((2, pixels.raster.shape[2]), np.int32)
     for view in range(len(shapes)):
-        lowest, above = np.float32(pixels.extremes[view, 0]), pixels.above[view]
+        lowest, above, gain_above = np.float32(pixels.extremes[view, 0]), pixels.above[view], pixels.gain_above[view]
         rows, columns = shapes[view]
-        above[0] = 0
+        above[0], gain_above[0] = 0, 0
         for v in range(rows):
             start = pixels.start[view] + v * columns
-            _fill_more(pixels.raster[view, v, :columns], pixels.owner[start : start + columns], lowest, more)
-            number, above[v + 1, 0], pixels.left_of[view, v, 0] = np.int32(0), 0, 0.0
+            _fill_more(pixels.raster[view, v, :columns], pixels.owner[start : start + columns], lowest, more, gain)
+            above[v + 1, 0], gain_above[v + 1, 0], pixels.left_of[view, v, 0] = 0, 0, 0.0
+            number, gained = np.int32(0), np.int32(0)
             for u in range(columns):
                 number += more[u]
+                gained += gain[u]
                 above[v + 1, u + 1] = above[v, u + 1] + number
+                gain_above[v + 1, u + 1] = gain_above[v, u + 1] + gained
         for k in range(strips.shape[1]):
-            pixels.is_shown[view, k] = strips[view, k, 2] > 0 and more_inside(view, k, strips[view], pixels.above) > 0
+            is_seen = strips[view, k, 2] > 0
+            pixels.is_shown[view, k] = is_seen and more_inside(view, k, strips[view], pixels.above) > 0
+            pixels.is_open[view, k] = is_seen and more_inside(view, k, strips[view], pixels.gain_above) > 0
 
 
 @part
-def _fill_more(raster: Singles, owner: Shorts, lowest: np.float32, more: Labels) -> None:
-    """Fill more (u,) with the excess of a row's pixels over the lowest, in quanta."""
+def _fill_more(raster: Singles, owner: Shorts, lowest: np.float32, more: Labels, gain: Labels) -> None:
+    """Fill more and gain (u,) with a row's excess over the lowest and with its log-odds above 0, in quanta."""
     for u in range(len(raster)):
         value = raster[u] if owner[u] < 0 else np.float32(0)
         steps = np.int32((value - lowest) * np.float32(QUANTA_PER_NAT)) + np.int32(1)
         more[u] = np.int32(0) if owner[u] < 0 and value == lowest else max(steps, np.int32(1))
+        gain[u] = np.int32(value * np.float32(QUANTA_PER_NAT)) + np.int32(1) if value > 0 else np.int32(0)
 
 
 @part
 def more_inside(view: int, box: int, boxes: Shorts, above: Labels) -> np.int32:
-    """Excess of a view's pixels in one of the boxes over the lowest, in quanta; sums above are modulo 2^32."""
+    """Sum of a view's pixels in one of the boxes, in quanta; sums above are modulo 2^32."""
     at = np.uint64(view)
     left, top = unsigned(boxes[box, 0]), unsigned(boxes[box, 1])
     right, bottom = unsigned(boxes[box, 2]), unsigned(boxes[box, 3])
