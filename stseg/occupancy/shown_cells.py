@@ -30,7 +30,7 @@ _NEARLY_ALL = 0.75
 _MOST_PIXELS = 1 << 20
 """Pixels up to which a sum of levels fits into 32 bits; blocks with more are taken to show something."""
 _MOST_COUNTED = 1 << 17
-"""Cells (n,) of which each stands for itself; of more, every second, third, ... stands for those that follow it."""
+"""Cells (n,) of which each stands for itself; of more, every second, third, ... block stands for the next ones."""
 _CODE_VIEWS = 60
 """Number of views with sets that one whole number codes."""
 
@@ -160,14 +160,14 @@ class CellTables:
         start = np.append(np.flatnonzero(np.diff(block[:count], prepend=-1)), count).astype(np.int32)
         seen_by = np.concatenate([sets.seen_by[view_set[:count]], sets.seen_by])
         unseen = np.where(np.ascontiguousarray(seen_by.T), np.int16(0), np.int16(UNSEEN))
-        number = np.concatenate([_sampled(count), others])
+        number = np.concatenate([_cell_numbers(count), others])
         return _MarkedCells(marked.copy(), cell[:count], place[:count], block[start[:-1]], start, unseen, number)
 
 
-def _sampled(count: int) -> Floats:
-    """How many of `count` cells, neighbours in their order, each stands for; neighbours mostly show the same pixels."""
+def _cell_numbers(count: int) -> Floats:
+    """Number of cells that each of `count` stands for: those of a block show nearly the same pixels, and stay together."""
     stride, number = 1 + count // _MOST_COUNTED, np.zeros(count)
-    number[::stride] = stride
+    number[np.arange(count) // BLOCK_SIDE**2 % stride == 0] = stride
     return number
 
 

@@ -27,6 +27,7 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.bodies.outlines import WHOLE_SHARE, Spans
 from stseg.bodies.views import BoxView, PixelView, ViewObservation
 from stseg.config import BodyConfig, ErrorRateConfig
+from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
 from stseg.records.forgetting import Forgetting
 from stseg.records.predicted_tracks import PredictedTracks
@@ -156,10 +157,20 @@ class _ExpectedPeople:
 
 def found_pixels(first: Ints, spans: Spans, foreground: Flags, shifts: Ints) -> tuple[Ints, Ints]:
     """Foreground pixels inside outlines (body,) shifted by (n, 2) along v and u, int64 (n, body); all (body,)."""
-    rows, columns = foreground.shape
-    left_of = np.pad(foreground, ((0, 1), (1, 0))).cumsum(1)  # the last row, without any, stands for those outside
-    v = first[:, None] + np.arange(spans.shape[1]) + shifts[:, 0, None, None]
-    v[(v < 0) | (v >= rows)] = rows
-    left, right = ((spans[..., k] + shifts[:, 1, None, None]).clip(0, columns) for k in range(2))
-    pixels = (spans[..., 1] - spans[..., 0]).clip(0).sum(1, dtype=np.int64)
-    return (left_of[v, np.maximum(left, right)] - left_of[v, left]).sum(2), pixels
+    left_of, found = np.pad(foreground, ((0, 0), (1, 0))).cumsum(1), np.empty((len(shifts), len(first)), np.int64)
+    _fill_found(first, spans, left_of, shifts, found)
+    return found, (spans[..., 1] - spans[..., 0]).clip(0).sum(1, dtype=np.int64)
+
+
+@kernel
+def _fill_found(first: Ints, spans: Spans, left_of: Ints, shifts: Ints, found: Ints) -> None:
+    """Fill found (n, body), see `found_pixels`, by sums of pixels to the left of each column, (v, u + 1)."""
+    columns = left_of.shape[1] - 1
+    for n in range(len(shifts)):
+        for j in range(len(first)):
+            total, top = 0, first[j] + shifts[n, 0]
+            for k in range(max(-top, 0), min(spans.shape[1], len(left_of) - top)):
+                left = min(max(spans[j, k, 0] + shifts[n, 1], 0), columns)
+                right = min(max(spans[j, k, 1] + shifts[n, 1], left), columns)
+                total += left_of[top + k, right] - left_of[top + k, left]
+            found[n, j] = total

@@ -81,11 +81,12 @@ def test_counts_by_definition(seed: int) -> None:
 
 
 def test_rates_of_some_cells_are_those_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a large ground one cell stands for those that follow it."""
+    """On a large ground one block stands for those that follow it."""
     seen, found = frame("pixels", 0), []
-    for most in (1 << 17, 30):
+    fine = rig_of(corner_cameras(), cell=0.1, planes=3)
+    for most in (1 << 17, 3000):
         monkeypatch.setattr(shown_cells, "_MOST_COUNTED", most)
-        fusion = occupancy("pixels")
+        fusion = Occupancy(fine, ["pixels"] * 4, OccupancyConfig(), FEW_HEIGHTS, BODY, CONFIG)
         rates = fusion.new_error_rates()
         fusion.fuse_and_learn(rates, *seen)
         found.append(rates.counts.sums[:, :, CLUTTER])

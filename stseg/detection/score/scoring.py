@@ -113,6 +113,15 @@ def crowding(members: Ints, count: int, problem: DetectionProblem) -> float:
 
 
 @part
+def contact_limit(problem: DetectionProblem) -> float:
+    """A distance beyond which no pair costs anything, metres."""
+    widest = 0.0
+    for i in range(len(problem.breadth)):
+        widest = max(widest, problem.breadth[i])
+    return float(_ROUNDING_RATIO * problem.parameters.minimum_distance * widest)
+
+
+@part
 def pair_cost(i: int, j: int, problem: DetectionProblem) -> float:
     """Cost of one pair, nats."""
     parameters = problem.parameters

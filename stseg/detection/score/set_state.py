@@ -15,7 +15,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.problem import DetectionProblem, PixelEvidence, RaggedArray
 from stseg.detection.score.box_state import BoxState, box_gain, box_part, box_state, link
-from stseg.detection.score.scoring import pair_cost
+from stseg.detection.score.scoring import contact_limit, pair_cost
 from stseg.detection.score.track_state import (
     TrackAssignment,
     assign_track,
@@ -128,8 +128,11 @@ def _neighbours(problem: DetectionProblem) -> RaggedArray:
     ground, candidates = problem.ground, len(problem.ground)
     start, number = np.zeros(candidates + 1, np.int64), 0
     item, value = np.empty(candidates * candidates, np.int64), np.empty(candidates * candidates)
+    reach = max(REPLACEMENT_DISTANCE, contact_limit(problem))
     for i in range(candidates):
         for j in range(candidates):
+            if max(abs(ground[i, 0] - ground[j, 0]), abs(ground[i, 1] - ground[j, 1])) > reach:
+                continue
             cost = pair_cost(i, j, problem)
             distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
             if i != j and (cost > 0 or distance <= REPLACEMENT_DISTANCE):
