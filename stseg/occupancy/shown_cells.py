@@ -165,7 +165,7 @@ class CellTables:
 
 
 def _cell_numbers(count: int) -> Floats:
-    """Number of cells that each of `count` stands for: those of a block show nearly the same pixels, and stay together."""
+    """Number of cells that each of `count` stands for; those of a block show nearly the same pixels."""
     stride, number = 1 + count // _MOST_COUNTED, np.zeros(count)
     number[np.arange(count) // BLOCK_SIDE**2 % stride == 0] = stride
     return number
