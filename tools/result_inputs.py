@@ -17,9 +17,9 @@ from datasets import cmc_truth, wildtrack_annotated_boxes, wildtrack_truth, writ
 def main(kind: str, source: Path, output: Path) -> None:
     """Make one of them."""
     if kind == "cmc-truth":
-        write_truth_csv(output, cmc_truth(source))
+        write_truth_csv(output, cmc_truth(source), overwrite=True)
     elif kind == "wildtrack-truth":
-        write_truth_csv(output, wildtrack_truth(source))
+        write_truth_csv(output, wildtrack_truth(source), overwrite=True)
     elif kind == "wildtrack-boxes":
         wildtrack_annotated_boxes(source, output)
     else:

@@ -21,6 +21,7 @@ from stseg.reporting.figures import backdrop
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.canvas import outline
 from stseg.reporting.pictures.overlay import grid_picture
+from stseg.view_health.agreement import agreement_warnings
 from stseg.view_health.plausibility import box_warnings, pace_warnings, scene_warnings, twin_warnings
 
 COLUMNS = ("camera", "recognised", "frames", "boxes", "a frame", "height px", "score", "feet in area", "classes")
@@ -30,6 +31,8 @@ _PICTURE_WIDTH = 1280
 _BOX_COLOUR = (80, 220, 120)
 _OUTSIDE_SHARE = 0.5
 """Share of feet outside the area from which there is a warning."""
+_BEYOND_SHARE = 0.05
+"""The same of boxes that begin beyond the right or lower edge of the image."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +58,11 @@ class SourceSummary:
 
     @property
     def feet(self) -> tuple[Ints, Floats]:
-        """Frames (n,) and places (n, 2), metres, of the boxes that stand in the area."""
+        """Frames of the recording (n,) and places (n, 2), metres, of the boxes that stand in the area."""
         pixel, within = self.boxes[self.in_area], self.in_area
         foot = np.stack([pixel[:, 0] + pixel[:, 2] / 2, pixel[:, 1] + pixel[:, 3]], -1)
         frame = np.zeros(0, np.int64) if self.detections is None else self.detections.kept.frame[within]
-        return frame, self.camera.back_project(foot)
+        return frame + self.source.offset, self.camera.back_project(foot)
 
     @property
     def boxes(self) -> Floats:
@@ -96,9 +99,9 @@ class SourceSummary:
                 f"{name}: {100 * outside:.0f} % of its feet project outside the area: "
                 "is it this camera, and the image size right?"
             )
-        right = float((pixel[:, 0] + pixel[:, 2]).max())
-        if right > 1.2 * self.camera.size[0]:
-            yield f"{name}: boxes reach to column {right:.0f} of an image {self.camera.size[0]} pixels wide"
+        excess = float((pixel[:, :2] > self.camera.size).any(axis=1).mean())
+        if excess > _BEYOND_SHARE:
+            yield f"{name}: {100 * excess:.0f} % of its boxes begin beyond the image: is the image size right?"
         yield from box_warnings(self.camera, self.grid, pixel, self.height)
 
     def picture(self, view: Observation, frame: int) -> Bytes:
@@ -136,6 +139,7 @@ def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary])
         *(words for summary in summaries for words in summary.warnings()),
         *twin_warnings(names, [summary.boxes for summary in summaries]),
         *list(paces)[:1],
+        *agreement_warnings(rig.cameras, *zip(*(one.feet for one in summaries), strict=True)),
     ]
 
 
