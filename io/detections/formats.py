@@ -22,6 +22,7 @@ JSON_FORMATS: tuple[tuple[str, Callable[[Any], bool], Callable[[Request, Any], D
     ("Ultralytics JSON", yolo.is_ultralytics_results, yolo.read_ultralytics_results),
     ("Label Studio", annotation_tools.is_label_studio, annotation_tools.read_label_studio),
     ("VIA", annotation_tools.is_via, annotation_tools.read_via),
+    ("JSON table", tables.is_json_table, tables.read_json_table),
 )
 """Name of each format of JSON, whether parsed JSON is of it, and its reader."""
 NAMES = (

@@ -1,4 +1,4 @@
-"""CSV and Parquet tables of boxes with columns of any names, and MOTChallenge's ground truth (`gt.txt`)."""
+"""CSV, Parquet and JSON tables of boxes with columns of any names, and MOTChallenge's ground truth (`gt.txt`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from stseg.errors import FormatError, SourceError
-from stseg.io.detections.record import DetectionList, Detections, Request, number
+from stseg.io.detections.record import DetectionList, Detections, Request, number, required_value
 from stseg.io.extras import load_extra
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
@@ -19,17 +19,17 @@ from stseg.io.untrusted.values import one_of, parse_number
 COLUMNS = ("frame", "left", "top", "width", "height", "right", "bottom", "x", "y", "score", "class")
 """Our names of columns; x and y are the middle of a box."""
 _SYNONYMS = {
-    "frame": ("frame_id", "frame_number", "frame_idx", "image", "t"),
-    "left": ("x1", "xmin", "bb_left", "xtl", "min_x"),
-    "top": ("y1", "ymin", "bb_top", "ytl", "min_y"),
-    "right": ("x2", "xmax", "xbr", "max_x"),
-    "bottom": ("y2", "ymax", "ybr", "max_y"),
+    "frame": ("frame_id", "frame_number", "frame_idx", "frame_index", "image", "t"),
+    "left": ("x1", "xmin", "bb_left", "xtl", "min_x", "x_min"),
+    "top": ("y1", "ymin", "bb_top", "ytl", "min_y", "y_min"),
+    "right": ("x2", "xmax", "xbr", "max_x", "x_max"),
+    "bottom": ("y2", "ymax", "ybr", "max_y", "y_max"),
     "width": ("w", "bb_width"),
     "height": ("h", "bb_height"),
     "x": ("cx", "x_center", "xc", "center_x"),
     "y": ("cy", "y_center", "yc", "center_y"),
     "score": ("conf", "confidence", "probability"),
-    "class": ("label", "category", "name", "class_name"),
+    "class": ("label", "category", "name", "class_name", "class_id"),
 }
 CLASS_NAMES = frozenset(("class", *_SYNONYMS["class"]))
 _FORMS = (("left", "top", "width", "height"), ("left", "top", "right", "bottom"), ("x", "y", "width", "height"))
@@ -71,6 +71,24 @@ def read_parquet(request: Request) -> Detections:
     return _collect(request, table.column_names, rows)
 
 
+def is_json_table(data: Any) -> bool:
+    """Whether parsed JSON is a list of boxes, each with its frame, as supervision's JSONSink writes them."""
+    if not isinstance(data, list) or not data or not isinstance(data[0], dict):
+        return False
+    at = known_columns([str(name) for name in data[0]], {})
+    return "frame" in at and _form(at) is not None
+
+
+def read_json_table(request: Request, data: Any) -> Detections:
+    """Boxes of a list in JSON."""
+    header = list(data[0])
+    rows = [
+        (f"box {k}", [required_value(request.path, f"box {k}", one, name) for name in header])
+        for k, one in enumerate(data)
+    ]
+    return _collect(request, header, rows)
+
+
 def known_columns(header: Sequence[str], columns: Mapping[str, str]) -> dict[str, int]:
     """Where our columns stand in a header, by the rig's mapping, our names, and the usual other names."""
     lower = [name.lower() for name in header]
@@ -88,7 +106,7 @@ def _collect(request: Request, header: Sequence[str], rows: Sequence[tuple[str, 
     for column, name in request.source.columns:
         if column not in at:
             raise FormatError(request.path, f"columns.{column}", f"no column {name}", one_of(name, list(header)))
-    form = next((form for form in _FORMS if all(name in at for name in form)), None)
+    form = _form(at)
     if form is None or "frame" not in at:
         raise FormatError(
             request.path, "header", f"the columns {', '.join(header)}"[:200],
@@ -106,9 +124,14 @@ def _collect(request: Request, header: Sequence[str], rows: Sequence[tuple[str, 
             box[2:] = box[2] - box[0], box[3] - box[1]
         elif form[0] == "x":
             box[:2] = box[0] - box[2] / 2, box[1] - box[3] / 2
-        score = row[at["score"]] if "score" in at else 1.0
+        score = row[at["score"]] if "score" in at and row[at["score"]] != "" else 1.0
         found.add(place, int(frame), box, score, str(row[at["class"]]).strip() if "class" in at else "")
     return found.done()
+
+
+def _form(columns: Mapping[str, int]) -> tuple[str, ...] | None:
+    """The four columns of a box among those that are known."""
+    return next((form for form in _FORMS if all(name in columns for name in form)), None)
 
 
 def is_ground_truth(path: Path) -> bool:

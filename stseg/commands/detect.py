@@ -45,7 +45,7 @@ def detect(
     class_
         Name or number of a class to keep, by default person; may be given several times.
     score
-        Least score of a box, 0..1; by default 0.25, and 0.5 with hog.
+        Least score of a box, 0..1; by default 0.25, and 0.3 with hog.
     overwrite
         Replace boxes of another detector or video, and the rig file.
     """

@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from stseg.arrays import AnyArray, Boxes, Observation
+from stseg.arrays import AnyArray, Boxes, Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera, Rig
 
 Views = Sequence[Any] | Mapping[str, Any]
 """One observation per camera, in the rig's order or by the camera's name; a camera that is not named is blind."""
+PEOPLE = (0,)
+"""Numbers of the classes that are people, in models of the usual data sets."""
 
 _PICTURES = {(np.dtype(kind), axes) for kind, axes in (("u1", 3), ("u1", 2), ("u2", 2), ("f4", 2), ("f8", 2))}
 
 
-def in_rig_order(rig: Rig, views: Views, place: str) -> list[Observation]:
+def in_rig_order(rig: Rig, views: Views, place: str, classes: Sequence[int] = PEOPLE) -> list[Observation]:
     """The observations of a frame set, checked; raises SourceError."""
     names = [camera.name for camera in rig.cameras]
     if isinstance(views, Mapping):
@@ -26,16 +28,19 @@ def in_rig_order(rig: Rig, views: Views, place: str) -> list[Observation]:
         views = [views.get(name) for name in names]
     if len(views) != len(names):
         raise SourceError(place, "", f"{len(views)} observations", f"{len(names)}, one per camera")
-    return [as_observation(view, camera, place) for view, camera in zip(views, rig.cameras, strict=True)]
+    return [as_observation(view, camera, place, classes) for view, camera in zip(views, rig.cameras, strict=True)]
 
 
-def as_observation(view: Any, camera: Camera, place: str) -> Observation:
+def as_observation(view: Any, camera: Camera, place: str, classes: Sequence[int] = PEOPLE) -> Observation:
     """One observation in the form that the stages take; raises SourceError where it does not suit the camera."""
     where = f"{place}, camera {camera.name}"
     if view is None:
         return None
     if isinstance(view, Boxes):
         return as_boxes(np.column_stack([view.pixel, view.score]), where)
+    detected = getattr(view, "boxes", view)  # Ultralytics' Results hold their boxes there, supervision's are Detections
+    if hasattr(detected, "xyxy"):
+        return as_boxes(detection_rows(detected, classes), where)
     array, shape = np.asarray(view), camera.size[::-1]
     if array.ndim == 2 and array.shape[1] in (4, 5) and array.shape != shape:
         return as_boxes(array, where)
@@ -43,6 +48,28 @@ def as_observation(view: Any, camera: Camera, place: str) -> Observation:
         expected = f"an image, mask or likelihood of {shape[0]} rows and {shape[1]} columns, or boxes (n, 4 or 5)"
         raise SourceError(where, "", f"an array of {array.dtype} {array.shape}", expected)
     return as_likelihood(array, where) if array.dtype.kind == "f" else array
+
+
+def detection_rows(detected: Any, classes: Sequence[int]) -> Floats:
+    """Left, top, width, height, score (n, 5) of `supervision.Detections` or `ultralytics.engine.results.Boxes`.
+
+    Of the wanted classes, or all where they have none. Boxes without an extent are left out.
+    """
+    corners = _as_array(detected.xyxy).reshape(-1, 4)
+    score, number = (
+        next((_as_array(found) for name in names if (found := getattr(detected, name, None)) is not None), None)
+        for names in (("confidence", "conf"), ("class_id", "cls"))
+    )
+    rows = np.column_stack([corners[:, :2], corners[:, 2:] - corners[:, :2], np.ones(len(corners))])
+    if score is not None:
+        rows[:, 4] = score
+    wanted = np.ones(len(rows), bool) if number is None else np.isin(number, classes)
+    return rows[wanted & (rows[:, 2:4] > 0).all(axis=1)]
+
+
+def _as_array(numbers: Any) -> Floats:
+    """Numbers of NumPy, or of a tensor on any device."""
+    return np.asarray(numbers.cpu() if hasattr(numbers, "cpu") else numbers, float)
 
 
 def as_boxes(array: AnyArray, place: str) -> Boxes:

@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Boxes, Bytes, Observation, Rows
 from stseg.config import Config
 from stseg.engine.committed_frames import CommittedFrames
-from stseg.engine.observations import Views, as_observation, in_rig_order
+from stseg.engine.observations import PEOPLE, Views, as_observation, in_rig_order
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import Session
 from stseg.errors import SourceError
@@ -28,8 +28,8 @@ class Tracker:
 
     An observation of a camera is a colour image uint8 (v, u, 3) in the order blue, green, red; a mask uint8 (v, u),
     0..255; a foreground likelihood float (v, u), 0..1; an instance image uint16 (v, u), 0 for background; boxes, float
-    (n, 4) of left, top, width, height or (n, 5) with a score 0..1, or `stseg.Boxes`; or None where it is blind. Each
-    camera keeps to one kind.
+    (n, 4) of left, top, width, height or (n, 5) with a score 0..1, `stseg.Boxes`, `supervision.Detections`, or a result
+    of Ultralytics; or None where it is blind. Each camera keeps to one kind.
 
     Parameters
     ----------
@@ -42,6 +42,8 @@ class Tracker:
     empty
         By the name of each camera that delivers colour images: images from which its background model is learned,
         uint8 (v, u, 3), of the empty scene or of one in which people move.
+    classes
+        Numbers of the classes to keep of detections that have classes; 0 is a person in the usual models.
 
     Raises
     ------
@@ -56,10 +58,12 @@ class Tracker:
         config: Config | None = None,
         tracker: str = "cut",
         empty: Mapping[str, Iterable[Bytes]] | None = None,
+        classes: Sequence[int] = PEOPLE,
     ) -> None:
         rig.require_coverage()
         self.rig, self.config, self._tracker = rig, config or Config(), tracker
         self._empty = {name: list(images) for name, images in (empty or {}).items()}
+        self._classes = classes
         self._session: Session | None = None
         self._next, self._is_finished = 0, False
         self._factors: list[int] = []
@@ -89,7 +93,7 @@ class Tracker:
             raise SourceError(place, "", f"the number {frame!r}", f"a whole number up to {limits.FRAMES}")
         if frame < self._next:
             raise SourceError(place, "", f"a frame before frame {self._next}", "frames in the order of time")
-        observations = in_rig_order(self.rig, views, place)
+        observations = in_rig_order(self.rig, views, place, self._classes)
         if self._session is None:
             self._session, self._next = self._begin(observations, frame), frame
         for camera, kind, view in zip(self.rig.cameras, self._kinds, observations, strict=True):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -20,6 +21,7 @@ from scenes import box_frame_sets, corner_cameras, rig_of, walkers
 import stseg
 from stseg.arrays import Boxes
 from stseg.commands.main import main
+from stseg.engine.observations import as_observation
 from stseg.engine.offline.calls import called_beside, called_here
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
@@ -86,6 +88,34 @@ def test_boxes_in_memory_are_tracked_as_those_of_files(rig_path: Path) -> None:
     assert np.concatenate([result.frames for result in results]).tolist() == run.frames.tolist()
     assert np.concatenate([result.label for result in results]).shape == run.volume.label.shape
     assert sum(len(result.detections) for result in results) == len(run.detections)
+
+
+class Tensor:
+    """Numbers on another device: nothing reads them before `cpu`."""
+
+    def __init__(self, *rows: object) -> None:
+        self.rows = np.asarray(rows, np.float32)
+
+    def cpu(self) -> np.ndarray:
+        return self.rows
+
+
+def test_detections_of_other_libraries_are_boxes() -> None:
+    corners, score, number = [[10, 12, 30, 42], [5, 5, 9, 9], [7, 7, 7, 9]], [0.5, 0.25, 0.75], [0, 2, 0]
+    of_supervision = SimpleNamespace(xyxy=np.array(corners), confidence=np.array(score), class_id=np.array(number))
+    results = SimpleNamespace(boxes=SimpleNamespace(xyxy=Tensor(*corners), conf=Tensor(*score), cls=Tensor(*number)))
+    for given in (of_supervision, results):
+        people = as_observation(given, RIG.cameras[0], "frame 0")
+        assert isinstance(people, Boxes)
+        assert (people.pixel.tolist(), people.score.tolist()) == ([[10, 12, 20, 30]], [0.5])
+        others = as_observation(given, RIG.cameras[0], "frame 0", [0, 2])
+        assert isinstance(others, Boxes) and others.score.tolist() == [0.5, 0.25]
+    bare = SimpleNamespace(xyxy=np.array(corners), confidence=None, class_id=None)
+    empty = SimpleNamespace(xyxy=np.zeros((0, 4)), confidence=np.zeros(0), class_id=np.zeros(0, int))
+    plain, none = (as_observation(given, RIG.cameras[0], "frame 0") for given in (bare, empty))
+    assert isinstance(plain, Boxes) and plain.score.tolist() == [1, 1]
+    assert isinstance(none, Boxes) and len(none) == 0
+    stseg.Tracker(RIG, classes=[2]).add([of_supervision, results, bare, None])
 
 
 @compiled_only
