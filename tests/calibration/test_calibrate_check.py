@@ -1,6 +1,7 @@
 """The check of a rig by boxes, and the page for clicking points."""
 
 import json
+import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from stseg.calibration.check.leave_one_out import locate
 from stseg.calibration.check.rig_check import Check, cell_coverage, check_rig, verdict_text
 from stseg.calibration.points.point_fit import Points, fit_points
 from stseg.commands.calibrate.app import app
+from stseg.commands.main import main
 from stseg.errors import ConfigError, OutputError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
@@ -226,14 +228,15 @@ def page(tmp_path: Path) -> Iterator[Page]:
     with chromium(tmp_path / "profile") as browser:
         browser.open(make(tmp_path))
         browser.wait_for("[...document.querySelectorAll('canvas')].length === 4")
+        browser.picture(1800, 1300)  # a click is a whole pixel of the screen: views are as large as on a desk's
         yield browser
 
 
-def click(page: Page, canvas: str, share: Floats) -> None:
+def click(page: Page, canvas: str, share: Floats, more: str = "") -> None:
     """Click where a share of the canvas's width and height is."""
     u, v = share.tolist()
     page.ask(f"""(() => {{ const c = document.getElementById('{canvas}'), b = c.getBoundingClientRect();
-      const at = {{ clientX: b.left + {u} * b.width, clientY: b.top + {v} * b.height, button: 0 }};
+      const at = {{ clientX: b.left + {u} * b.width, clientY: b.top + {v} * b.height, button: 0 {more} }};
       c.dispatchEvent(new MouseEvent('mousedown', at)); dispatchEvent(new MouseEvent('mouseup', at));
       return 0; }})()""")
 
@@ -285,7 +288,7 @@ def test_undo_poles_keys_and_the_hint(page: Page) -> None:
     assert page.ask(table) == csv
     press(page, "p")
     click(page, "view-cam1", np.array([0.5, 0.3]))
-    assert page.ask(table).count(",0.0025,-0.0025,2\n") == 1
+    assert page.ask(table).count(",2\n") == 1
     press(page, "Delete")
     assert page.ask(table) == csv
     yellow = """(() => { const c = document.getElementById('plan'), d = c.getContext('2d')
@@ -293,6 +296,48 @@ def test_undo_poles_keys_and_the_hint(page: Page) -> None:
       for (let k = 0; k < d.length; k += 4) n += d[k] > 220 && d[k + 1] > 140 && d[k + 1] < 190 && d[k + 2] < 40;
       return n; })()"""
     assert page.ask(yellow) > 30, "a ring where the next point helps most"
+
+
+@needs_browser
+def test_places_are_entered_snapped_and_dragged(page: Page) -> None:
+    table = "document.getElementById('csv').value"
+    for ground in PLACES[:5]:
+        press(page, "n")
+        place(page, ground)
+    pixel = CAMERAS[0].project(np.array([[1.0, 1.0]]), 0.0)[0][0]
+    click(page, "view-cam1", (pixel + 0.5) / CAMERAS[0].size, ", shiftKey: true")
+    assert page.ask(table).count(",1.0000,1.0000,0\n") == 1, "a crossing of the grid"
+    entry = "(() => {{ const e = document.getElementById('{}'); e.value = '{}'; e.onchange && e.onchange(); }})()"
+    for name, value in (("x", 1.234), ("y", -0.5), ("snap", 0.5)):
+        page.ask(entry.format(name, value))
+    assert page.ask(table).count(",1.2340,-0.5000,0\n") == 1
+    press(page, "n")
+    click(page, "plan", np.array([0.52, 0.26]))
+    assert page.ask("[document.getElementById('x').value, document.getElementById('y').value]") == ["0", "1.5"]
+
+
+@needs_browser
+def test_everything_fits_one_screen(page: Page) -> None:
+    page.picture(1280, 720)
+    low = page.ask(
+        "Math.max(...[...document.querySelectorAll('figcaption')].map((f) => f.getBoundingClientRect().bottom))"
+    )
+    assert low < 720
+    page.ask("""(() => { const c = document.getElementById('view-cam1'), b = c.getBoundingClientRect();
+      c.dispatchEvent(new MouseEvent('mousemove', { clientX: b.left + 9, clientY: b.top + 9 })); return 0; })()""")
+    assert page.ask("document.getElementById('lens').getBoundingClientRect().width") == 160
+
+
+@needs_browser
+def test_the_next_command_makes_the_rig(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for ground in PLACES:
+        press(page, "n")
+        place(page, ground)
+    monkeypatch.chdir(tmp_path)
+    Path("points.csv").write_text(page.ask("document.getElementById('csv').value"))
+    command = page.ask("document.querySelector('code').textContent").replace("FRAMES_PER_SECOND", "25")
+    assert main(shlex.split(command)[1:]) == 0
+    assert read_recording(Path("rig.toml")).sources[0].source.path == tmp_path / "cam1.png"
 
 
 def test_wrong_options_are_named(tmp_path: Path) -> None:

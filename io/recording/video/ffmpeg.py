@@ -7,6 +7,7 @@ session descriptions are, is refused: no container of video is text.
 
 from __future__ import annotations
 
+import math
 import os
 import stat
 from collections.abc import Iterator
@@ -103,3 +104,11 @@ def read_video_size(path: Path) -> tuple[int, int]:
     if not decoded:
         raise SourceError(path, "", "no frame that decodes", "a video that FFmpeg decodes")
     return int(picture.shape[1]), int(picture.shape[0])
+
+
+def read_frame_rate(path: Path) -> float | None:
+    """Frames per second by a video's head; None where it gives none."""
+    capture = open_video(path, "")
+    rate = capture.get(cv2.CAP_PROP_FPS)
+    capture.release()
+    return float(rate) if math.isfinite(rate) and rate > 0 else None

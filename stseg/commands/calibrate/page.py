@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import numpy as np
@@ -16,15 +18,18 @@ from stseg.io.recording.pictures import read_colour
 from stseg.io.recording.recording import Source
 from stseg.io.recording.source_files import is_image_source
 from stseg.io.recording.streams import open_stream
+from stseg.io.recording.video.ffmpeg import read_frame_rate
 from stseg.reporting.page.calibration_page import FloorPlan, calibration_page
 from stseg.tasks.calibration.automatic import camera_names, uncalibrated_camera
+
+_DEFAULT_FRAMES = (0, 50, 100, 200, 400, 800)
 
 
 def calibrate_page(
     *videos: Annotated[Path, Parameter(metavar="VIDEO...")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="POINTS.html")],
     area: Annotated[str, Parameter(metavar="X0,Y0,X1,Y1", allow_leading_hyphen=True)] = "-5,-5,5,5",
-    frame: int = 0,
+    frame: Annotated[tuple[int, ...], Parameter(negative="")] = (),
     plan: Annotated[Path | None, Parameter(metavar="PLAN.png")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
@@ -44,7 +49,8 @@ def calibrate_page(
     area
         Ground rectangle of the plan, metres.
     frame
-        Frame of the videos that is shown.
+        A frame of the videos that is shown; may be given several times, and a slider chooses among them. Without it,
+        frames 0, 50, 100, 200, 400 and 800 of videos that are so long.
     plan
         Picture of the ground from above that spans the area exactly, y up.
     overwrite
@@ -57,23 +63,44 @@ def calibrate_page(
     x0, y0, x1, y1 = numbers("--area", area, "4 numbers x0,y0,x1,y1", 4)
     if not (x0 < x1 and y0 < y1):
         raise ConfigError("--area", "", repr(area), "x0,y0,x1,y1 with x0 below x1 and y0 below y1")
-    frames = [_frame(path, frame) for path in videos]
-    write_page(output, calibration_page(names, frames, (x0, y0, x1, y1), _plan(plan, x1 - x0, y1 - y0)), overwrite)
+    frames = [_frames(path, frame) for path in videos]
+    command = _next_command(videos, [one[0] for one in frames], area)
+    floor = _plan(plan, x1 - x0, y1 - y0)
+    write_page(output, calibration_page(names, frames, (x0, y0, x1, y1), floor, command), overwrite)
     print(f"wrote {output}: {len(frames)} views (it shows camera frames); open it in a browser")
 
 
-def _frame(path: Path, number: int) -> Bytes:
-    """A colour frame of a video, or a picture."""
+def _frames(path: Path, chosen: tuple[int, ...]) -> list[Bytes]:
+    """Colour frames of a video, or a picture."""
     if is_image_source(path):
-        return read_colour(path)
-    stream = open_stream(Source("video", path), uncalibrated_camera(path.stem, path))
+        return [read_colour(path)]
+    found: list[Bytes] = []
+    stream, place = open_stream(Source("video", path), uncalibrated_camera(path.stem, path)), 0
     try:
-        view = stream.read() if stream.skip(number) == number else None
+        for number in sorted(set(chosen or _DEFAULT_FRAMES)):
+            view = stream.read() if stream.skip(number - place) == number - place else None
+            place = number + 1
+            if isinstance(view, np.ndarray):
+                found.append(np.asarray(view, np.uint8))
+            elif chosen or not found:
+                raise SourceError(path, "--frame", number, "a frame of the video")
+            else:
+                break
     finally:
         stream.close()
-    if not isinstance(view, np.ndarray):
-        raise SourceError(path, "--frame", number, "a frame of the video")
-    return np.asarray(view, np.uint8)
+    return found
+
+
+def _next_command(videos: Sequence[Path], frames: Sequence[Bytes], area: str) -> str:
+    """The command that makes a rig of the points, by the names in the page."""
+    sizes = {(frame.shape[1], frame.shape[0]) for frame in frames}
+    width, height = max(sizes)
+    films = [path for path in videos if not is_image_source(path)]
+    rate = read_frame_rate(films[0]) if films else None
+    frame_rate = "FRAMES_PER_SECOND" if rate is None else f"{rate:.6g}"
+    scene = f"--size {width},{height} --area={area} --frame-rate {frame_rate}"
+    streams = f"--sources {quote(','.join(map(str, videos)))}{'' if films else ' --source-kind images'}"
+    return f"stseg calibrate points points.csv -o rig.toml {scene} {streams}"
 
 
 def _plan(path: Path | None, width: float, height: float) -> FloorPlan | None:

@@ -91,20 +91,34 @@
   // ---- views ----
 
   const sheets = [];
-  const addSheet = (name, width, height, image, camera) => {
+  const addSheet = (name, width, height, images, camera) => {
     const figure = document.createElement("figure"), canvas = document.createElement("canvas");
     const caption = document.createElement("figcaption");
     canvas.id = camera ? `view-${name}` : "plan";
     canvas.tabIndex = 0;
     figure.append(canvas, caption);
     element("sheets").append(figure);
-    const sheet = { name, width, height, canvas, caption, camera, image: null, zoom: 1, left: 0, top: 0 };
-    if (image) { sheet.image = new Image(); sheet.image.onload = draw; sheet.image.src = image; }
+    const sheet = { name, width, height, canvas, caption, camera, image: null, zoom: 1, left: 0, top: 0, at: null };
+    sheet.images = images.map((source) => { const image = new Image(); image.onload = draw; image.src = source; return image; });
+    sheet.image = sheet.images[0] || null;
     sheets.push(sheet);
     canvas.addEventListener("mousedown", (event) => press(sheet, event));
     canvas.addEventListener("mousemove", (event) => magnify(sheet, event));
-    canvas.addEventListener("mouseleave", () => { element("lens").hidden = true; });
+    canvas.addEventListener("mouseleave", () => { element("lens").hidden = true; sheet.at = null; label(sheet); });
     canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(sheet, event); }, { passive: false });
+  };
+  // As many columns as show all views and the plan largest in one window.
+  const arrange = () => {
+    const wide = element("sheets").clientWidth, high = Math.max(innerHeight - element("sheets").offsetTop - 8, 320);
+    const sizes = (columns) => sheets.map((sheet) => {
+      const across = (wide - 8 * (columns - 1)) / columns;
+      const down = high / Math.ceil(sheets.length / columns) - 32;
+      return Math.max(Math.min(across, down * sheet.width / sheet.height), 120);
+    });
+    const area = (columns) => sizes(columns).reduce((sum, width, k) => sum + width * width * sheets[k].height / sheets[k].width, 0);
+    const columns = sheets.map((_, k) => k + 1).reduce((best, one) => (area(one) > area(best) ? one : best), 1);
+    element("sheets").style.gridTemplateColumns = `repeat(${columns}, 1fr)`;
+    sizes(columns).forEach((width, k) => { sheets[k].canvas.style.width = `${Math.floor(width)}px`; });
   };
   const scaleOf = (sheet) => sheet.canvas.width / sheet.width * sheet.zoom;
   const toCanvas = (sheet, [u, v]) => [(u + 0.5 - sheet.left) * scaleOf(sheet), (v + 0.5 - sheet.top) * scaleOf(sheet)];
@@ -129,10 +143,13 @@
   };
   const magnify = (sheet, event) => {
     const lens = element("lens"), [u, v] = fromEvent(sheet, event), context = lens.getContext("2d");
+    sheet.at = [u, v];
+    label(sheet);
     lens.hidden = !sheet.image;
     if (!sheet.image) return;
-    lens.style.left = `${event.clientX + 24}px`;
-    lens.style.top = `${event.clientY + 24}px`;
+    // At the side of the cursor that has room.
+    lens.style.left = `${event.clientX + (event.clientX + 200 < innerWidth ? 24 : -188)}px`;
+    lens.style.top = `${event.clientY + (event.clientY + 200 < innerHeight ? 24 : -188)}px`;
     const share = sheet.image.naturalWidth / sheet.width;
     context.imageSmoothingEnabled = false;
     context.fillRect(0, 0, 160, 160);
@@ -155,9 +172,26 @@
     });
     return found;
   };
+  const snapped = (ground) => {
+    const step = Number(element("snap").value);
+    return step ? ground.map((one) => Math.round(one / step) * step) : ground;
+  };
   const set = (sheet, place) => {
     if (sheet.camera) points[active].pixels[sheet.name] = place;
-    else points[active].ground = planGround(place);
+    else points[active].ground = snapped(planGround(place));
+  };
+  // The crossing of a view's grid that is nearest to a pixel.
+  const crossing = (sheet, place) => {
+    const ground = sheet.found && toGround(sheet.found, place), step = gridStep();
+    return ground && ground.map((one) => Math.round(one / step) * step);
+  };
+  const enter = (name) => {
+    if (active < 0) add();
+    remember();
+    const point = points[active], value = Number(element(name).value);
+    if (name === "z") point.z = value;
+    else point.ground = name === "x" ? [value, point.ground ? point.ground[1] : 0] : [point.ground ? point.ground[0] : 0, value];
+    draw();
   };
   const press = (sheet, event) => {
     if (event.button !== 0) return;
@@ -166,7 +200,10 @@
     last = sheet;
     remember();
     if (near >= 0) active = near;
-    else {
+    else if (event.shiftKey && sheet.camera && sheet.found) {
+      add(0, crossing(sheet, place));
+      set(sheet, place);
+    } else {
       if (active < 0) add();
       set(sheet, place);
     }
@@ -232,11 +269,29 @@
       }
       context.stroke();
     };
-    const step = [0.5, 1, 2, 5, 10, 20].find((s) => Math.max(x1 - x0, y1 - y0) / s <= 20) || 50;
+    const step = gridStep();
     for (let x = Math.ceil(x0 / step) * step; x <= x1 + 1e-9; x += step) line([x, y0], [x, y1]);
     for (let y = Math.ceil(y0 / step) * step; y <= y1 + 1e-9; y += step) line([x0, y], [x1, y]);
+    if (sheet.camera) return;
+    context.lineWidth = 2.5;
+    if (x0 <= 0 && x1 >= 0) line([0, y0], [0, y1]);
+    if (y0 <= 0 && y1 >= 0) line([x0, 0], [x1, 0]);
+    context.fillStyle = QUIET;
+    context.font = "11px system-ui, sans-serif";
+    const write = (value, ground) => { const [u, v] = toCanvas(sheet, map(ground)); context.fillText(+value.toFixed(2), u + 3, v - 3); };
+    const apart = step * [1, 2, 4, 10].find((n) => n * step * planScale * scaleOf(sheet) >= 34 || n === 10);
+    for (let x = Math.ceil(x0 / apart) * apart; x <= x1 + 1e-9; x += apart) write(x, [x, y0]);
+    for (let y = Math.ceil(y0 / apart) * apart; y <= y1 + 1e-9; y += apart) write(y, [x0, y]);
+  };
+  const gridStep = () => [0.5, 1, 2, 5, 10, 20].find((s) => Math.max(x1 - x0, y1 - y0) / s <= 20) || 50;
+  // The caption: the place under the cursor, and how well the points agree.
+  const label = (sheet) => {
+    const ground = sheet.at && (sheet.camera ? sheet.found && toGround(sheet.found, sheet.at) : planGround(sheet.at));
+    const place = ground ? `x ${ground[0].toFixed(2)}, y ${ground[1].toFixed(2)} m; ` : "";
+    sheet.caption.textContent = `${sheet.name}: ${place}${sheet.words}`;
   };
   const draw = () => {
+    arrange();
     const rows = [];
     const hints = [];
     for (const sheet of sheets.filter((one) => one.camera)) sheet.found = fit(sheet.camera);
@@ -273,7 +328,8 @@
         const own = placeOf(sheet, point);
         if (own) cross(context, toCanvas(sheet, own), k === active ? POINT : QUIET, `${k + 1}${point.z ? ` z ${point.z}` : ""}`);
       });
-      sheet.caption.textContent = `${sheet.name}: ${words}`;
+      sheet.words = words;
+      label(sheet);
     }
     const plan = sheets.find((sheet) => !sheet.camera), context = plan.canvas.getContext("2d");
     for (const ground of hints) ring(context, toCanvas(plan, planPixel(ground)));
@@ -282,6 +338,10 @@
       row.append(...cells.map((cell) => { const td = document.createElement("td"); td.textContent = cell; return td; }));
       return row;
     }));
+    const ground = active < 0 ? null : points[active].ground;
+    for (const [name, value] of [["x", ground && ground[0]], ["y", ground && ground[1]], ["z", active < 0 ? null : points[active].z]]) {
+      if (document.activeElement !== element(name)) element(name).value = value === null ? "" : +value.toFixed(4);
+    }
     element("which").textContent = active < 0 ? "none" : `${active + 1} of ${points.length}`;
     const csv = text();
     element("csv").value = csv;
@@ -292,8 +352,14 @@
     .map((point) => [sheet.name, ...point.pixels[sheet.name].map((p) => p.toFixed(2)),
       ...point.ground.map((p) => p.toFixed(4)), point.z].join(",")))].join("\n") + "\n";
 
-  addSheet("plan", data.plan.width, data.plan.height, data.plan.image, null);
-  for (const camera of data.cameras) addSheet(camera.name, camera.width, camera.height, camera.image, camera);
+  addSheet("plan", data.plan.width, data.plan.height, data.plan.image ? [data.plan.image] : [], null);
+  for (const camera of data.cameras) addSheet(camera.name, camera.width, camera.height, camera.images, camera);
+  for (const name of ["x", "y", "z"]) element(name).onchange = () => enter(name);
+  element("moment").parentElement.hidden = data.cameras.every((camera) => camera.images.length < 2);
+  element("moment").oninput = () => {
+    for (const sheet of sheets) sheet.image = sheet.images[Math.min(element("moment").value, sheet.images.length - 1)] || null;
+    draw();
+  };
   element("new").onclick = () => { keys.n(); draw(); };
   element("raise").onclick = () => { keys.p(); draw(); };
   element("undo").onclick = undo;
