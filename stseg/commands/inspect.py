@@ -145,9 +145,8 @@ def _minutes(people: list[float]) -> str:
 
 
 def event_counts_text(counts: dict[str, int]) -> str:
-    """Counts of events by kind; a merge and the split that ends it are one encounter."""
-    named = {"encounter" if kind == "merge" else kind: count for kind, count in counts.items() if kind != "split"}
-    return ", ".join(f"{count} {kind}" for kind, count in named.items())
+    """Counts of events by kind; a split is the end of a merge."""
+    return ", ".join(f"{count} {kind}" for kind, count in counts.items() if kind != "split")
 
 
 def _views(overview: Overview) -> Table:

@@ -130,7 +130,10 @@ def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     named["frame"][dead] = np.minimum(named["frame"], last)[dead]
     refuted = (born & (first < named["frame"])) | (dead & (last > named["frame"]))
     nowhere = np.isin(named["kind"], (b"birth", b"death")) & ~born & ~dead
-    joined = [(link.frame, b"hand-over", link.identity, link.track, link.reason.encode()) for link in links]
+    joined = [
+        (link.frame, b"hand-over", link.identity, 0, f"goes on as {link.track} of /committed: {link.reason}".encode())
+        for link in links
+    ]
     return np.concatenate([named[~(refuted | nowhere)], np.array(joined, EVENT)])
 
 

@@ -31,6 +31,7 @@ from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, 
 from stseg.commands.calibrate.auto import calibrate_auto
 from stseg.errors import ConfigError, SourceError
 from stseg.io.recording.rigs import read_recording
+from stseg.tasks.calibration.automatic import frame_rate_notes
 
 IMAGE = (480, 360)
 
@@ -319,6 +320,16 @@ def test_wrong_options_are_named(
     given = {"frame_rate": 5.0, "source_kind": "masks", **options}
     with pytest.raises(ConfigError, match=message):
         calibrate_auto(tmp_path / "a.avi", tmp_path / "b.avi", output=tmp_path / "rig.toml", **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("frame_rate", "count"), [(5.2, 0), (25.0, 1)])
+def test_another_frame_rate_is_named(tmp_path: Path, frame_rate: float, count: int) -> None:
+    film = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 5.0, (64, 48))
+    for _ in range(5):
+        film.write(np.zeros((48, 64, 3), np.uint8))
+    film.release()
+    notes = frame_rate_notes([tmp_path / "a.avi"], frame_rate)
+    assert len(notes) == count and all("has 5 frames per second by its head, not 25" in note for note in notes)
 
 
 def test_videos_need_different_names_and_more_than_one(tmp_path: Path) -> None:

@@ -160,7 +160,7 @@ def test_a_slice_needs_a_file_and_destroys_none(run_path: Path, tmp_path: Path, 
 
 
 def test_inspect_on_a_screen(run_path: Path, stdout: Command) -> None:
-    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
+    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 merge"
     screen = stdout("inspect", run_path)
     for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
         assert said in screen

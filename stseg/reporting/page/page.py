@@ -250,19 +250,15 @@ def _cells(cell_probability: Sequence[tuple[float, float]]) -> str:
 
 
 def _event_summary(contents: Contents) -> str:
-    """Counts of events by kind; a merge and its split are one encounter."""
+    """Counts of events by kind; a split is the end of a merge."""
     kinds, counts = np.unique(_without_splits(contents.events)["kind"], return_counts=True)
-    words = [f"{_kind(kind)} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
+    words = [f"{escape(kind.decode())} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
     return note(" &middot; ".join(words) or "none")
 
 
 def _without_splits(events: Rows) -> Rows:
-    """Events without splits: the merge row holds the duration of an encounter."""
+    """Events without splits: a merge's row holds its duration."""
     return np.asarray(events[events["kind"] != b"split"])
-
-
-def _kind(kind: bytes) -> str:
-    return "encounter" if kind == b"merge" else escape(kind.decode())
 
 
 def _event_table(span: Span, events: Rows) -> str:
@@ -272,7 +268,7 @@ def _event_table(span: Span, events: Rows) -> str:
     rows = [
         (
             when(span, int(row["frame"])),
-            _kind(row["kind"]),
+            escape(row["kind"].decode()),
             swatch(int(row["id"])),
             swatch(int(row["other"])) if row["other"] else "",
             escape(row["reason"].decode(errors="replace")),

@@ -34,13 +34,15 @@ from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import write_rig
 from stseg.io.recording.source_files import recording_files
-from stseg.io.recording.video.ffmpeg import read_video_size
+from stseg.io.recording.video.ffmpeg import read_frame_rate, read_video_size
 
 Distance = tuple[str, float, float, float, float, float]
 """A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""
 _UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
+_RATE_MARGIN = 0.1
+"""Least log-ratio of two frame rates that counts as a difference."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ def calibrate_auto(
     names = [camera.name for camera in streams.rig.cameras]
     known = [_known_distance(distance, names) for distance in distances]
     counted = index_streams(streams)
-    for note in counted.notes:
+    for note in (*frame_rate_notes(paths, frame_rate), *counted.notes):
         reporter.note(note)
     first, stop = _frame_range(frames, counted.length)
     foregrounds = make_foregrounds(streams, Config(), first, stop, streams=counted)
@@ -171,6 +173,16 @@ def camera_names(videos: Sequence[Path]) -> list[str]:
     """Names of the cameras of videos: of the files, or of their folders where those are called the same."""
     names = [path.stem for path in videos]
     return [path.absolute().parent.name for path in videos] if len(set(names)) < len(names) else names
+
+
+def frame_rate_notes(videos: Sequence[Path], frame_rate: float) -> list[str]:
+    """A sentence for each video whose head gives another frame rate."""
+    rates = [(path, read_frame_rate(path)) for path in videos if path.is_file()]
+    return [
+        f"{path} has {rate:.6g} frames per second by its head, not {frame_rate:g}: give --frame-rate {rate:.6g}"
+        for path, rate in rates
+        if rate is not None and abs(np.log(rate / frame_rate)) > _RATE_MARGIN
+    ]
 
 
 def uncalibrated_camera(name: str, video: Path) -> Camera:
