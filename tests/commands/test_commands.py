@@ -45,7 +45,7 @@ def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["inspekt", "x.h5"], "command line: found 'inspekt', expected one of demo, run, inspect"),
+        (["inspekt", "x.h5"], "command line: found 'inspekt', expected one of demo, detect, run, inspect"),
         (["inspekt"], "did you mean inspect?"),
         (["inspect"], "RUN"),
         (["inspect", "x.h5", "--jsn"], "--jsn"),
