@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from pathlib import PurePath
 from shlex import quote
 
 import cv2
@@ -46,7 +45,7 @@ def review_page(title: str, run_name: str, grid: Grid, questions: Sequence[Quest
     """The page's text; `run_name` is the run file's."""
     items = "\n".join(map(_item, questions))
     privacy = "This page shows images from the cameras: share it with care." if shows_images else "No camera image."
-    corrected = str(PurePath(run_name).with_suffix(".corrected.h5"))
+    corrected = f"{run_name.removesuffix('.h5')}.corrected.h5"
     command = f"stseg correct {quote(run_name)} answers.csv -o {quote(corrected)}"
     border = None if grid.polygon is None else np.asarray(grid.polygon).tolist()
     question_data = [{"text": one.text, "choices": one.choices, "film": one.film} for one in questions]
