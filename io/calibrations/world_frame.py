@@ -76,9 +76,9 @@ class World:
             raise CalibrationError(foreign.file, "projection matrix", error.found, error.expected) from error
 
 
-def guess_up(cameras: Sequence[ForeignCamera]) -> Up:
+def guess_up(cameras: Sequence[ForeignCamera], mirrored: bool = False) -> Up:
     """The axis that points upwards in most images: cameras are mounted nearly upright."""
-    upward = np.sum([-_rotation(camera)[1] for camera in cameras], axis=0)
+    upward = np.sum([(1 if mirrored else -1) * _rotation(camera)[1] for camera in cameras], axis=0)
     axis = int(np.abs(upward).argmax())
     name = f"{'+' if upward[axis] > 0 else '-'}{'xyz'[axis]}"
     return next(up for up in get_args(Up) if up == name)
@@ -95,7 +95,7 @@ def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False)
             cameras[0].file,
             "camera centres",
             f"cameras below the ground with {up} upwards",
-            "them above it: give --up, and --mirrored where the calibration is left-handed",
+            f"them above it: give {'' if mirrored else '--mirrored where the calibration is left-handed, or '}--up",
         )
     return min(UNITS, key=lambda unit: abs(np.log(height * UNITS[unit] / _USUAL_HEIGHT)))
 
@@ -132,7 +132,7 @@ def _centre(camera: ForeignCamera) -> Floats:
 
 
 def _rotation(camera: ForeignCamera) -> Floats:
-    """R of P ~ K [R | t] with a positive diagonal of K and det R = 1, float64 (3, 3)."""
+    """R of P ~ K [R | t] with a positive diagonal of K and det R = 1, float64 (3, 3); -R in a left-handed world."""
     triangle, rotation = rq(camera.projection[:, :3])
     rotation = np.sign(np.diag(triangle))[:, None] * rotation
     return np.asarray(rotation * np.sign(np.linalg.det(rotation)))

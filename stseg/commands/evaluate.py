@@ -9,10 +9,10 @@ from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
 from stseg.arrays import Ints, Rows
+from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
@@ -74,7 +74,7 @@ def evaluate(
     if as_json:
         print(json.dumps(scores.as_dict(), indent=1))
     else:
-        Console(highlight=False).print(_table(scores))
+        output_console().print(_table(scores))
 
 
 def _read(tracks: Path) -> Rows:

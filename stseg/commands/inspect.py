@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
+from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
@@ -71,14 +72,14 @@ def inspect(
     elif as_json:
         print(json.dumps(asdict(summarise_run(found)), indent=1))
     else:
-        _show(summarise_run(found), Console(highlight=False, markup=False))
+        _show(summarise_run(found), output_console())
 
 
 def _inspect_rig(path: Path, pictures: Path | None, overwrite: bool) -> None:
     """Print what each camera's source is and holds, and draw one frame of each camera into a folder."""
     recording = read_recording(path)
     summaries = summarise_sources(recording)
-    console = Console(highlight=False, markup=False)
+    console = output_console()
     table = Table(box=None, padding=(0, 2, 0, 0), title=str(path), title_justify="left")
     for name in COLUMNS:
         table.add_column(name, justify="left" if name in ("camera", "recognised", "classes") else "right")

@@ -12,7 +12,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import Literal, NoReturn
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, MissingArgumentError
 
 from stseg.commands.terminal.standard_error import without_library_messages
 from stseg.commands.terminal.termination import INTERRUPTED, TERMINATED, Termination
@@ -93,6 +93,8 @@ def _run(tokens: list[str]) -> int:
         _require_command(tokens)
         _app(tokens)(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
+    except MissingArgumentError as error:
+        return _fail(_missing(error, tokens))
     except (StsegError, CycloptsError) as error:
         return _fail(str(error))
     except MemoryError:
@@ -113,6 +115,15 @@ def _run(tokens: list[str]) -> int:
     finally:
         termination.forget()
     return 0
+
+
+def _missing(error: MissingArgumentError, tokens: Sequence[str]) -> str:
+    """The message for an option without a value, and for one that was left out."""
+    names = () if error.argument is None else error.argument.names
+    if not names or any(token.partition("=")[0] in names for token in tokens):
+        return str(error)
+    command = " ".join(error.command_chain or ())
+    return f"command line: {names[0]}: found nothing, expected it; see stseg {command} --help"
 
 
 def _fail(message: str) -> int:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
+from stseg.commands.terminal.standard_output import output_console
 from stseg.measures.measure import Measures
 from stseg.tasks import measures
 
@@ -55,7 +55,7 @@ def measure(
 
 
 def _print(found: Measures) -> None:
-    console = Console(highlight=False, markup=False)
+    console = output_console()
     zones = Table(box=None, padding=(0, 2, 0, 0))
     for name in ("zone", "people", "most", "entries", "exits", "dwell s", "per m2"):
         zones.add_column(name, justify="left" if name == "zone" else "right")

@@ -260,3 +260,14 @@ def test_every_background_model_can_be_asked_for(demo: Demo, tmp_path: Path, mod
     chosen = f"foreground.model={model}"
     assert main(["run", str(rig), "-o", str(output), "--frames", "0:12", "--set", chosen]) == 0
     assert len(read_run(output).trajectory) > 0
+
+
+def test_tables_are_whole_in_a_pipe(run_path: Path, stdout: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    lines = stdout("inspect", run_path).splitlines()
+    assert lines[1].startswith("scene") and "run of 20" in lines[1]
+
+
+def test_an_option_that_was_left_out_is_missing(refusal: Command) -> None:
+    assert "command line: -o: found nothing, expected it; see stseg run --help" in refusal("run", "rig.toml")
+    assert "requires an argument" in refusal("run", "rig.toml", "-o")

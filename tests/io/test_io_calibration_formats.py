@@ -296,13 +296,27 @@ class TestGuesses:
         read = (Path("c"), "a", SIZE, MATRIX, np.asarray(rotation), pose(0)[1], np.zeros(5))
         refused(CalibrationError, r"rotation: found a mirror", camera_from_pose, *read)
 
+    def test_a_mirrored_world_takes_one_try(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        """A ground whose y counts downwards; the area lies to one side of its x axis."""
+        for k, camera in enumerate(turned("+z", 1.0)):
+            np.savetxt(tmp_path / f"c{k}.txt", camera.projection @ np.diag([1.0, -1.0, 1.0, 1.0]))
+        files = [f"c{k}.txt" for k in range(4)]
+        refused(CalibrationError, r"--mirrored", run, "matrix", *files, "--size=640,480", "-o=r.toml")
+        wrong, said = "--area=-12,13,-9,16", r"--area: .* --area=-12,-16,-9,-13: --mirrored reverses y"
+        refused(ConfigError, said, run, "matrix", files[1], "--size=640,480", "-o=r.toml", "--mirrored", area=wrong)
+        for up in ((), ("--up=z",), ("--up", "+z")):
+            run("matrix", *files, "--size=640,480", "-o=r.toml", "--mirrored", *up, "--overwrite")
+        assert "+z up (given), mirrored" in capsys.readouterr().out
+        for k, found in enumerate(read_recording("r.toml").rig.cameras):
+            np.testing.assert_allclose(found.project(GROUND, HEIGHTS)[0], expected(k, np.zeros(5)), rtol=0, atol=1e-6)
+
     @pytest.mark.parametrize("unit", ["km", "-1", "nan", "0"])
     def test_no_unit(self, unit: str) -> None:
         refused(ConfigError, r"--unit: found", World, unit)
 
 
-def run(*tokens: str) -> None:
-    options = ("--area=-1.5,-1.5,1.5,1.5", "--frame-rate=5", "--source-pattern={name}.avi")
+def run(*tokens: str, area: str = "--area=-1.5,-1.5,1.5,1.5") -> None:
+    options = (area, "--frame-rate=5", "--source-pattern={name}.avi")
     app(["import", *tokens, *options], exit_on_error=False, print_error=False, result_action="return_value")
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
 from stseg.commands.terminal.standard_error import TerminalReporter
+from stseg.commands.terminal.standard_output import output_console
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.rigs import read_recording
@@ -71,7 +71,7 @@ def check(
 
 
 def _print(found: RigCheck) -> None:
-    console = Console(highlight=False, markup=False)
+    console = output_console()
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in COLUMNS:
         table.add_column(name, justify="left" if name == "camera" else "right")

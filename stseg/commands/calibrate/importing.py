@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 from cyclopts import Parameter
 
@@ -31,7 +31,7 @@ def import_calibration(
     streams: StreamOptions | None = None,
     size: Annotated[str | None, Parameter(metavar="W,H")] = None,
     unit: Annotated[str | None, Parameter(metavar="mm|cm|m|METRES")] = None,
-    up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
+    up: Annotated[Up | Literal["x", "y", "z"] | None, Parameter(allow_leading_hyphen=True)] = None,
     mirrored: Annotated[bool, Parameter(negative="")] = False,
     head: float = 1.75,
     names: Annotated[str | None, Parameter(metavar="A,B,...")] = None,
@@ -66,7 +66,7 @@ def import_calibration(
         Which of their axes points away from the ground. With -z, X = x, Y = -y, Z = -z; with -y (a camera's own
         axes), X = x, Y = -z, Z = y. Without it, the one that is upwards in the images.
     mirrored
-        The calibrations are left-handed: our y is theirs, the other way round.
+        The calibrations are left-handed: our y is theirs, the other way round. --area is in our y.
     head
         pom: height of the head plane, metres.
     names
@@ -129,8 +129,9 @@ def _file_names(files: Sequence[Path]) -> list[str]:
     raise ConfigError("--names", "", "files and folders that share their names", "a name for each camera")
 
 
-def _world(cameras: Sequence[ForeignCamera], unit: str | None, up: Up | None, mirrored: bool) -> World:
-    upward = up or guess_up(cameras)
+def _world(cameras: Sequence[ForeignCamera], unit: str | None, up: str | None, mirrored: bool) -> World:
+    given: dict[str | None, Up] = {one: one for one in get_args(Up)} | {one[1]: one for one in ("+x", "+y", "+z")}
+    upward = given[up] if up else guess_up(cameras, mirrored)
     world = World(unit or guess_unit(cameras, upward, mirrored), upward, mirrored)
     require_median_height(cameras, world)
     return world
@@ -146,14 +147,26 @@ def _size(camera: ForeignCamera, shared: tuple[int, int] | None) -> tuple[int, i
 
 
 def _require_front(foreign: Sequence[ForeignCamera], rig: Rig, world: World) -> None:
-    """Name a mirrored world, in which the cameras that look at the area have it behind them."""
+    """Name a mirrored world, in which the cameras that look at the area have it behind them, and an area left in it."""
+    (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
+    if world.mirrored and _sees_area(replace(rig, grid=replace(rig.grid, y=(-y1, -y0), polygon=None))):
+        there = f"--area={x0:g},{-y1:g},{x1:g},{-y0:g}: --mirrored reverses y"
+        raise ConfigError("--area", "", f"an area that no view shows, y {y0:g} to {y1:g}", there)
     if all(is_mirrored(camera, rig.grid) for camera in rig.cameras):
         found = "a mirrored world, in which the area lies behind every camera"
         undo = "without --mirrored" if world.mirrored else "--mirrored, where the calibration is left-handed"
         raise CalibrationError(foreign[0].file, "handedness", found, f"the area before the cameras: {undo}, or --up")
 
 
-def _world_line(world: World, unit: str | None, up: Up | None) -> str:
+def _sees_area(rig: Rig) -> bool:
+    try:
+        rig.require_coverage()
+    except CalibrationError:
+        return False
+    return True
+
+
+def _world_line(world: World, unit: str | None, up: str | None) -> str:
     length = f"in {world.unit}" if world.unit in UNITS else f"in units of {world.unit} m"
     words = [
         f"{length} ({'given' if unit else 'guessed: --unit'})",

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
 from stseg.calibration.points.point_fit import PointFit
 from stseg.commands.calibrate.scene import SceneOptions, StreamOptions, size_of
+from stseg.commands.terminal.standard_output import output_console
 from stseg.tasks.calibration import points as points_task
 from stseg.tasks.calibration.points import PointCalibration, fit_warnings
 
@@ -79,7 +79,7 @@ def calibrate_points(
 
 def _show(found: PointCalibration) -> None:
     """Print every point with its error, and a line and warnings of each camera."""
-    console = Console(highlight=False, markup=False)
+    console = output_console()
     table = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("camera", "line", "x m", "y m", "z m", "off px", "off cm", ""):
         table.add_column(heading, justify="left" if heading in ("camera", "") else "right")
