@@ -18,6 +18,8 @@ from stseg.records.tables import CORRECTION, TRAJECTORY
 _COLUMNS = ("frame", "time", "id", "x", "y", "height", "score")
 LIVE_HEADER = ",".join(_COLUMNS)
 COLUMNS = CORRECTION.names or ()
+_UNMEASURED = "nan"
+"""A height that the frame did not measure."""
 _IDS = 1 << 31
 """Largest id in a line."""
 
@@ -37,7 +39,7 @@ class LiveTable:
     def __init__(self, path: Path, frame_rate: float, stop: int) -> None:
         self.path, self._frame_rate = path, frame_rate
         lines = _whole_lines(path, stop, len(_COLUMNS), {0: limits.FRAMES, 2: _IDS})
-        lines = [line for line in lines if parse_numbers(line[3:]) is not None]
+        lines = [line for line in lines if _has_numbers(line)]
         self.rows = np.zeros(len(lines), TRAJECTORY)
         for name in ("frame", "id", "x", "y"):
             self.rows[name] = [parse_number(line[_COLUMNS.index(name)]) for line in lines]
@@ -94,6 +96,12 @@ class CorrectionTable:
             begun = self.path.exists()
             with self.path.open("a", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows([*([] if begun else [COLUMNS]), *rows.tolist()])
+
+
+def _has_numbers(line: Sequence[str]) -> bool:
+    """Whether place and score of a line of `LiveTable` are numbers, and its height where it has one."""
+    x, y, height, score = line[3:]
+    return parse_numbers([x, y, score] + [height] * (height != _UNMEASURED)) is not None
 
 
 def _whole_lines(path: Path, stop: int, columns: int, whole: Mapping[int, int]) -> list[list[str]]:

@@ -8,6 +8,7 @@ slow or missing receiver never delays tracking. While it cannot be reached the n
 from __future__ import annotations
 
 import json
+import math
 import urllib.request
 from base64 import b64encode
 from collections.abc import Callable, Sequence
@@ -84,9 +85,10 @@ class Publisher:
                     self._dropped += 1
 
     def _object(self, row: Any) -> dict[str, object]:
-        frame, numbers = int(row["frame"]), ("x", "y", "height", "score")
+        frame = int(row["frame"])
         about: dict[str, object] = {"frame": frame, "time": round(frame / self._frame_rate, 3), "id": int(row["id"])}
-        return about | {name: round(float(row[name]), 3) for name in numbers}
+        numbers = {name: float(row[name]) for name in ("x", "y", "height", "score")}
+        return about | {name: round(value, 3) if math.isfinite(value) else None for name, value in numbers.items()}
 
     def _run(self) -> None:
         while not (self._ending.is_set() and self._messages.empty()):

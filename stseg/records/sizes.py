@@ -10,6 +10,9 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, TrackingConfig
 
+_UNMEASURED_SHARE = 0.6
+"""Share of the population's variance from which on a frame has not measured a size."""
+
 
 @dataclass(frozen=True)
 class Sizes:
@@ -53,6 +56,13 @@ class Sizes:
             self.height, self.height_variance + noise.height_noise**2,
             self.width, self.width_variance + noise.width_noise**2,
         )  # fmt: skip
+
+    def measured(self, body: BodyConfig) -> tuple[Floats, Floats]:
+        """Heights and widths (n,), metres; nan where these posteriors leave the population's variance as it was."""
+        return (
+            np.where(self.height_variance < _UNMEASURED_SHARE * body.height_spread**2, self.height, np.nan),
+            np.where(self.width_variance < _UNMEASURED_SHARE * body.width_spread**2, self.width, np.nan),
+        )
 
     def as_measurements(self, prior: Sizes) -> Sizes:
         """These posteriors as measurements: the prior taken out of their variances.

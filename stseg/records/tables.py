@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stseg.arrays import Rows
+from stseg.records.track_heights import median_measured
 
 TRAJECTORY = np.dtype(
     [
@@ -22,7 +23,7 @@ TRAJECTORY = np.dtype(
         ("xx", "<f8"),  # covariance of the position, square metres
         ("xy", "<f8"),
         ("yy", "<f8"),
-        ("height", "<f4"),  # metres, by the frame alone
+        ("height", "<f4"),  # metres, by the frame alone; nan where it measured none
         ("width", "<f4"),  # metres across the shoulders, likewise
         ("extent", "<f4"),  # ground area of the labelled cells, square metres
         ("score", "<f4"),  # log-odds of a person, nats
@@ -40,8 +41,8 @@ TRACK = np.dtype(
         ("last", "<i8"),
         ("frames", "<i8"),  # number of frames with a position
         ("score", "<f4"),  # mean log-odds, nats
-        ("height", "<f4"),  # median, metres
-        ("width", "<f4"),  # median, metres
+        ("height", "<f4"),  # median of those measured, metres; nan without
+        ("width", "<f4"),  # likewise
     ]
 )
 """One row per track."""
@@ -186,5 +187,5 @@ class Tracks:
             track = self.trajectory[order[start:stop]]
             row["first"], row["last"], row["frames"] = track["frame"].min(), track["frame"].max(), len(track)
             row["score"] = track["score"].mean()
-            row["height"], row["width"] = np.median(track["height"]), np.median(track["width"])
+            row["height"], row["width"] = median_measured(track["height"]), median_measured(track["width"])
         return rows

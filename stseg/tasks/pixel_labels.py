@@ -23,6 +23,7 @@ from stseg.io.runfile.runs import Run
 from stseg.pixel_labels.appearance import ColourSums, ViewAppearance
 from stseg.pixel_labels.label_likelihood import PlacedPeople
 from stseg.pixel_labels.views import ViewLabels, view_labels
+from stseg.records.track_heights import with_heights
 from stseg.reporting.pictures.colours import track_palette
 
 _LEARNING_FRAMES = 200
@@ -72,7 +73,7 @@ def label_images(
     if config is None:
         config = parse_config(found.provenance.config, f"{found.path}: the configuration", tuple(changes))
     chosen, reporter, cameras = frames_of_run(found, frames), reporter_of(progress), require_pixels(found.recording)
-    people, largest = _people(found.trajectory, chosen), int(found.trajectory["id"].max(initial=0))
+    people, largest = _people(with_heights(found.trajectory), chosen), int(found.trajectory["id"].max(initial=0))
     names, inputs = [found.cameras[k] for k in cameras], Inputs(found.files)
     images = LabelImages(Path(folder), names, largest, track_palette(), overwrite, inputs)
     views = view_labels(found.recording.rig, config.labels, config.body)

@@ -190,11 +190,12 @@ class CutTracker:
         people = fused.people if len(fused.people) else None
         ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
         height, score = blobs.height[named].copy(), blobs.mass[named].copy()
-        width = np.full(len(named), self.config.body.width_mean)
+        width = np.full(len(named), np.nan)
         if people is not None:
             ground[detected], covariance[detected] = people.ground[detections], people.covariance[detections]
-            height[detected], score[detected] = people.sizes.height[detections], people.evidence[detections]
-            width[detected] = people.sizes.width[detections]
+            tall, wide = people.sizes.measured(self.config.body)
+            height[detected], score[detected] = tall[detections], people.evidence[detections]
+            width[detected] = wide[detections]
         views = views_at(self.views, ground, self.rig.grid)
         tracks = TrackPlaces(identity[named], ground, covariance, height, width, score)
         return trajectory_rows(fused.frame, tracks, blobs.extent[named], views)

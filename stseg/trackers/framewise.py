@@ -54,10 +54,11 @@ class FrameTracker(FramewiseTracker):
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
         """Add a frame; it is committed at once."""
         del observed
-        people, sizes, issued = fused.people, fused.people.sizes, self.filter.issued
+        people, issued = fused.people, self.filter.issued
         ids = self.filter.update(fused.frame, people, fused.ghosts)
         births = [(fused.frame, "birth", int(i), 0, "nobody known was near") for i in np.sort(ids[ids > issued])]
-        tracks = TrackPlaces(ids, people.ground, people.covariance, sizes.height, sizes.width, people.evidence)
+        sizes = people.sizes.measured(self.config.body)
+        tracks = TrackPlaces(ids, people.ground, people.covariance, *sizes, people.evidence)
         return [self.commit(fused, tracks, births)]
 
 

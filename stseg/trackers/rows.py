@@ -24,9 +24,9 @@ class TrackPlaces(NamedTuple):
     covariance: Floats
     """float64 (n, 2, 2): square metres."""
     height: Floats
-    """float64 (n,): metres."""
+    """float64 (n,): metres, nan where unmeasured."""
     width: Floats
-    """float64 (n,): metres."""
+    """float64 (n,): metres, nan where unmeasured."""
     score: Floats
     """float64 (n,): nats."""
 

@@ -24,6 +24,7 @@ from stseg.identities.evidence.size_model import MeasuredSizes
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
 from stseg.records.tables import BOX, EVENT
+from stseg.records.track_heights import with_heights
 from stseg.tracking.windows.encounters import encounters
 from stseg.trajectories.pruning import coincident, drop_ghosts, drop_short
 from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
@@ -181,9 +182,11 @@ class _Names:
 def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:
     """BOX rows of a TRAJECTORY, clipped to the images; none where a view does not see the body.
 
+    A row without a height has its track's.
+
     Sorted by frame, then id, then view, as the trajectory is.
     """
-    rows = []
+    rows, trajectory = [], with_heights(trajectory)
     ground = np.column_stack([trajectory["x"], trajectory["y"]])
     for view, table in enumerate(tables):
         width, height = table.size

@@ -39,8 +39,8 @@ def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig, keep_
 def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
     """TRAJECTORY rows in gaps of at most `tracking.interpolation_gap`.
 
-    They have extent 0, and a covariance that grows with the time to the nearest detection. Longer gaps stay open: the
-    path there is unknown.
+    They have extent 0, no sizes, and a covariance that grows with the time to the nearest detection. Longer gaps stay
+    open: the path there is unknown.
     """
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     step, same = np.diff(table["frame"]), np.diff(table["id"]) == 0
@@ -69,11 +69,12 @@ def _between(before: np.void, after: np.void) -> Rows:
     filled = np.zeros(len(frames), TRAJECTORY)
     fraction = (frames - before["frame"]) / (after["frame"] - before["frame"])
     filled["frame"], filled["id"] = frames, before["id"]
-    for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "height", "width", "score"):
+    for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "score"):
         filled[name] = before[name] + fraction * (after[name] - before[name])
     away = np.minimum(frames - before["frame"], after["frame"] - frames)
     filled["xx"] += (_DRIFT_PER_FRAME * away) ** 2
     filled["yy"] += (_DRIFT_PER_FRAME * away) ** 2
+    filled["height"] = filled["width"] = np.nan
     filled["views"] = before["views"]
     return filled
 

@@ -98,9 +98,10 @@ def body_warnings(cameras: Sequence[str], trajectory: Rows, rates: Rows, body: B
 
 
 def _sizes(trajectory: Rows, body: BodyConfig) -> list[str]:
-    if len(trajectory) < _LEAST_MEASUREMENTS:
+    measured = trajectory[np.isfinite(trajectory["height"]) & np.isfinite(trajectory["width"])]
+    if len(measured) < _LEAST_MEASUREMENTS:
         return []
-    height, width = (float(np.median(trajectory[name])) for name in ("height", "width"))
+    height, width = (float(np.median(measured[name])) for name in ("height", "width"))
     usual = float(body.width_of(np.array([height]))[0])
     if width > usual + _WIDTH_DEVIATIONS * body.width_spread:
         return [

@@ -12,6 +12,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from arrivals import meanwhile
 from refusals import Command, refused
@@ -19,6 +20,7 @@ from run_files import table_of
 
 from stseg.arrays import Rows
 from stseg.errors import ConfigError
+from stseg.io.live.live_tables import LiveTable
 from stseg.io.live.publishing import Publisher, receiver_of
 from stseg.records.tables import TRAJECTORY
 
@@ -93,6 +95,19 @@ def test_rows_arrive_by_http(posted: tuple[str, list[bytes], list[int]]) -> None
         publisher.append(rows_of(9))
     assert [len(body.splitlines()) for body in bodies] == [2, 1]
     assert parsed(bodies) == EXPECTED
+
+
+def test_an_unmeasured_height_is_null_there_and_nan_in_the_table(
+    posted: tuple[str, list[bytes], list[int]], tmp_path: Path
+) -> None:
+    address, bodies, _ = posted
+    rows = rows_of(7)
+    rows["height"] = np.nan
+    with publisher_to(address) as publisher, LiveTable(tmp_path / "live.csv", 5.0, 0) as live:
+        publisher.append(rows)
+        live.append(rows)
+    assert parsed(bodies) == [{**EXPECTED[0], "height": None}]
+    assert LiveTable(live.path, 5.0, 8).rows[["frame", "id", "x", "y"]].tolist() == [(7, 3, 1.25, -0.5)]
 
 
 @pytest.mark.parametrize("failures", [[503, 503], [302], [307]])

@@ -1,14 +1,17 @@
-"""Forgetting sums, reliability of cells, and distance from the border."""
+"""Forgetting sums, reliability of cells, sizes, and distance from the border."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from run_files import small_volume, write_small_run
+from run_files import small_volume, table_of, write_small_run
 from scenes import room
 from scipy.special import expit
 
+from stseg.config import BodyConfig
 from stseg.geometry import Grid
+from stseg.geometry.rig import BODY_HEIGHT
 from stseg.io.runfile.runs import read_run
 from stseg.records.border import Border
 from stseg.records.cell_reliability import (
@@ -20,6 +23,9 @@ from stseg.records.cell_reliability import (
     filled_cells,
 )
 from stseg.records.forgetting import Forgetting
+from stseg.records.sizes import Sizes
+from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.records.track_heights import with_heights
 
 
 def test_memory_is_in_seconds_and_at_least_some_frames() -> None:
@@ -108,6 +114,21 @@ def test_of_a_run_file(tmp_path: Path) -> None:
     order = np.argsort(log_odds[seen])
     assert (np.diff(probability[seen][order]) >= 0).all()
     assert 0 < probability[seen].mean() < 1
+
+
+def test_sizes_that_the_evidence_left_open_are_unmeasured() -> None:
+    config = BodyConfig()
+    open_sizes = Sizes.of_population(2, config)
+    sizes = replace(open_sizes, height=np.array([1.6, 1.8]), height_variance=np.array([1e-3, config.height_spread**2]))
+    height, width = sizes.measured(config)
+    np.testing.assert_array_equal(height, [1.6, np.nan])
+    assert np.isnan(width).all()
+
+
+def test_a_track_has_the_median_of_its_measured_sizes() -> None:
+    rows = table_of(TRAJECTORY, frame=[0, 0, 1, 2, 3], id=[1, 2, 1, 1, 1], height=[1.6, np.nan, np.nan, 1.7, 1.75])
+    assert with_heights(rows)["height"] == pytest.approx([1.6, BODY_HEIGHT, 1.7, 1.7, 1.75])
+    np.testing.assert_array_equal(Tracks(rows).summary()["height"], np.array([1.7, np.nan], np.float32))
 
 
 def test_points_have_the_distance_of_their_cell() -> None:

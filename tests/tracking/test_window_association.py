@@ -385,9 +385,12 @@ def test_short_gaps_are_filled_on_straight_lines(first: set[int], second: set[in
         unseen = ~np.isin(own["frame"], list(frames))
         assert (own["xx"][unseen] > 0.01).all()
         assert (own["xx"][~unseen] == 0.01).all()
+        assert (np.isnan(own["height"]) == unseen).all() and np.isnan(own["width"][unseen]).all()
     keys = [(row["frame"], row["id"]) for row in filled]
     assert keys == sorted(keys)
-    np.testing.assert_array_equal(fill_gaps(filled, RATE, CONFIG), filled)
+    again = fill_gaps(filled, RATE, CONFIG)
+    for name in filled.dtype.names or ():
+        np.testing.assert_array_equal(again[name], filled[name])
     assert len(fill_gaps(seen[:0], RATE, CONFIG)) == 0
 
 
@@ -406,3 +409,6 @@ def test_boxes_of_tracks_lie_in_the_images() -> None:
     pixel, _ = cameras[1].project(np.zeros((1, 2)), 0.9)
     assert np.abs(pixel[0] - (middle["left"] + middle["width"] / 2, middle["top"] + middle["height"] / 2)).max() < 3
     assert len(box_rows(tables, rows[:0])) == 0
+    gap = rows.copy()
+    gap["height"][(gap["id"] == 5) | (gap["frame"] == 3)] = np.nan
+    np.testing.assert_array_equal(box_rows(tables, gap), boxes)

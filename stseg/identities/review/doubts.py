@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Rows
+from stseg.records.track_heights import median_measured
 from stseg.tracking.row_groups import rows_of_tracks
 
 _ENCOUNTER_DISTANCE = 0.7
@@ -109,7 +110,7 @@ def _swap_margin(a: Rows, b: Rows, first: int, last: int, frame_rate: float) -> 
 
 
 def _height(before: Rows, after: Rows) -> float:
-    off = float(np.median(before["height"]) - np.median(after["height"]))
+    off = median_measured(before["height"]) - median_measured(after["height"])
     return 0.25 * (off / _HEIGHT_ERROR) ** 2 if np.isfinite(off) else 0.0
 
 

@@ -232,7 +232,7 @@ def _track_table(span: Span, tracks: Rows, certainty: Floats, names: Mapping[int
             when(span, int(row["first"])),
             when(span, int(row["last"])),
             f"{row['frames']}",
-            f"{row['height']:.2f}",
+            f"{row['height']:.2f}" if np.isfinite(row["height"]) else "not measured",
             f"{100 * sure:.1f}",
         )
         for row, sure in zip(tracks[:MOST_ROWS], certainty.tolist(), strict=False)

@@ -13,6 +13,7 @@ from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.bodies.pillars import PROFILE
 from stseg.geometry import Camera, Grid
 from stseg.geometry.rig import BODY_HEIGHT
+from stseg.records.track_heights import with_heights
 from stseg.reporting.pictures.canvas import blank, chip, chips, disc, fading_stroke, fill, outline, stroke, text
 from stseg.reporting.pictures.colours import INK, NIGHT, PAPER, Colour, Picture, mixed, track_colour
 
@@ -56,6 +57,7 @@ def overlay(
     canvas = view.canvas(image)
     if image is None or image.ndim == 2:
         _rule(canvas, view, grid)
+    trajectory = with_heights(trajectory)
     present = trajectory[trajectory["frame"] == frame]
     recent = trajectory[(trajectory["frame"] <= frame) & (trajectory["frame"] >= frame - trail)]
     for row in present:
@@ -125,7 +127,7 @@ def pillar_outline(view: OverlayView, ground: Floats, height: float) -> list[Flo
 
 def _draw_pillar(canvas: Bytes, view: OverlayView, row: np.void) -> None:
     ground, colour = np.array([row["x"], row["y"]]), track_colour(int(row["id"]))
-    for polygon in pillar_outline(view, ground, _height(row)):
+    for polygon in pillar_outline(view, ground, float(row["height"])):
         fill(canvas, polygon, colour, 0.28)
         outline(canvas, polygon, mixed(colour, PAPER, 0.15), 2)
     foot = view.pixel(ground, 0.0)
@@ -145,17 +147,11 @@ def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail:
 
 def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
     """Ids above the heads."""
-    heights = np.array([_height(row) for row in people])
-    heads = view.pixel(np.stack([people["x"], people["y"]], -1), heights + 0.12)
+    heads = view.pixel(np.stack([people["x"], people["y"]], -1), people["height"] + 0.12)
     inside = np.isfinite(heads).all(axis=1) & (heads >= 0).all(axis=1) & (heads < view.size).all(axis=1)
     heads, people = heads[inside], people[inside]
     ids, bounds = people["id"].tolist(), (4, 4, view.size[0] - 4, view.size[1] - 4)
     chips(canvas, heads, [*map(str, ids)], map(track_colour, ids), 13, bounds)
-
-
-def _height(row: np.void) -> float:
-    height = float(row["height"])
-    return height if np.isfinite(height) and height > 0 else BODY_HEIGHT
 
 
 def _rule(canvas: Bytes, view: OverlayView, grid: Grid) -> None:

@@ -31,8 +31,6 @@ _REPETITION_DISCOUNT = 2.0
 """Discount of a rejected candidate's evidence: consecutive frames are not independent, nats."""
 EXCLUSION_RADIUS = 0.5
 """Radius around existing tracks within which no track begins and no place is interpolated, metres."""
-_UNMEASURED_SHARE = 0.6
-"""Share of the population's variance from which on a frame has not measured a size."""
 
 
 class Measurement(NamedTuple):
@@ -228,11 +226,8 @@ class TrackFilter:
 
     def _measured(self, people: People) -> tuple[list[Measurement], list[Measurement]]:
         """Heights and widths that a frame measured; a size that it left open has no weight."""
-        sizes, prior, noise = people.sizes, self.body, self.config
-        return (
-            _measurements(sizes.height, sizes.height_variance, prior.height_spread, noise.height_noise),
-            _measurements(sizes.width, sizes.width_variance, prior.width_spread, noise.width_noise),
-        )
+        height, width = people.sizes.measured(self.body)
+        return _measurements(height, self.config.height_noise), _measurements(width, self.config.width_noise)
 
     def _grounds(self, tracks: list[TrackState]) -> Floats:
         """Where bodies of tracks are expected, float64 (n, 2), metres."""
@@ -272,7 +267,8 @@ class TrackFilter:
         return TrackState(0, frame, state, spread, *sizes, 0.0)
 
 
-def _measurements(mean: Floats, variance: Floats, spread: float, noise: float) -> list[Measurement]:
-    """Measurements of one size, metres, from posteriors of a prior with the standard deviation `spread`."""
-    used = np.where(variance < _UNMEASURED_SHARE * spread**2, noise**2, np.inf)
-    return [Measurement(*one) for one in zip(mean.tolist(), used.tolist(), strict=True)]
+def _measurements(size: Floats, noise: float) -> list[Measurement]:
+    """Measurements of one size (n,), metres, with the standard deviation `noise`; nan says nothing."""
+    measured = np.isfinite(size)
+    known, variance = np.where(measured, size, 0.0), np.where(measured, noise**2, np.inf)
+    return [Measurement(*one) for one in zip(known.tolist(), variance.tolist(), strict=True)]
