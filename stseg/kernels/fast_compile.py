@@ -19,6 +19,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime.nrt import rtsys
+from numba.core.types import unliteral
 
 from stseg.kernels.cache import KernelCache, KernelFiles, locked
 
@@ -41,7 +42,7 @@ class Kernel(CPUDispatcher):
     @cached_property
     def _inner(self) -> Any:
         """The same kernel as part of others."""
-        return CPUDispatcher(self.py_func, targetoptions=self.targetoptions | _INNER_OPTIONS)
+        return _InnerKernel(self.py_func, targetoptions=self.targetoptions | _INNER_OPTIONS)
 
     @property
     def _numba_type_(self) -> Any:
@@ -68,6 +69,14 @@ class Kernel(CPUDispatcher):
             return _FastCache(self.py_func)
         except RuntimeError:  # no folder can be written to
             return NullCache()
+
+
+class _InnerKernel(CPUDispatcher):
+    """A kernel as part of others."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """The form for the types of some arguments: -1 is a whole number like others, not a type of its own."""
+        return super().get_call_template([unliteral(one) for one in args], kws)
 
 
 class _FastFiles(KernelFiles):

@@ -10,7 +10,7 @@ from recordings import process, started
 from refusals import refused
 
 from stseg.arrays import Floats, Ints
-from stseg.kernels.accelerate import kernel, python_form
+from stseg.kernels.accelerate import FAST, kernel, python_form
 from stseg.kernels.pointed_tuples import pointed
 
 PROGRAM = """
@@ -48,6 +48,11 @@ def sum_of_halves(values: Floats, number: int) -> float:
     return total
 
 
+@kernel
+def halves_of_two(values: Floats) -> float:
+    return half(values, 0) + half(values, 1)
+
+
 COMPILED = pytest.mark.skipif(python_form(half) is half, reason="kernels are not compiled")
 
 
@@ -60,6 +65,12 @@ def test_python_and_kernels_call_the_same_kernel() -> None:
 
 
 @COMPILED
+@pytest.mark.skipif(not FAST, reason="compiled by numba alone")
+def test_a_kernel_is_not_made_anew_for_each_number() -> None:
+    assert halves_of_two(np.array([1.0, 2.0])) == 1.5
+    assert len(half._inner.overloads) == 1  # type: ignore[attr-defined]
+
+
 def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
     empty, first, second, ahead = (
         process(program, NUMBA_CACHE_DIR=str(tmp_path)).stdout.splitlines()
