@@ -85,18 +85,18 @@ def _read(tracks: Path) -> Rows:
     return read_trajectory(tracks)
 
 
-def _frames(text: str) -> Ints:
+def _frames(text: str) -> Ints | range:
     given = [parse_whole(part, -limits.FRAMES, limits.FRAMES) for part in text.replace(":", ",").split(",")]
     numbers = [number for number in given if number is not None]
     whole = len(numbers) == len(given)
     if ":" in text:
-        frames = np.arange(*numbers) if whole and len(numbers) == 2 else np.zeros(0, np.int64)
+        frames: Ints | range = range(*numbers) if whole and len(numbers) == 2 else range(0)
     else:
         frames = np.array(numbers if whole else [], np.int64)
     if not len(frames):
         expected = f"A:B with B above A, or a list A,B,C; numbers up to {limits.FRAMES}"
         raise ConfigError("command line", "--frames", abbreviated(text), expected)
-    return frames.astype(np.int64)
+    return frames
 
 
 def _area(text: str) -> Area:

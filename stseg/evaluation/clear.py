@@ -38,9 +38,12 @@ def match_per_frame(sequence: Sequence, gate: float) -> Matches:
 
 def match_with_continuity(sequence: Sequence, gate: float) -> Matches:
     """CLEAR's matches: pairs of the previous frame continue while they are within the gate."""
-    before = np.full(sequence.people, -1, np.int64)
+    before, last = np.full(sequence.people, -1, np.int64), 0
     matches = []
     for frame in sequence.frames:
+        if frame.index > last + 1:
+            before.fill(-1)  # frames without people and tracks stand between
+        last = frame.index
         rows, columns = match(frame.distance, gate, before[frame.person][:, None] == frame.track)
         before.fill(-1)
         before[frame.person[rows]] = frame.track[columns]
@@ -79,11 +82,13 @@ def _by_person(pairs: Matches) -> tuple[Ints, Flags]:
 
 
 def _gather(sequence: Sequence, matches: list[tuple[Ints, Ints]]) -> Matches:
-    frame = np.repeat(np.arange(len(matches)), [len(rows) for rows, _ in matches])
+    index = np.array([frame.index for frame in sequence.frames], np.int64)
+    frame = np.repeat(index, [len(rows) for rows, _ in matches])
     found = list(zip(sequence.frames, matches, strict=True))
     person = [frame.person[rows] for frame, (rows, _) in found]
     track = [frame.track[columns] for frame, (_, columns) in found]
-    distance = [frame.distance[pair] for frame, pair in found]
+    away = [frame.person_ground[rows] - frame.track_ground[columns] for frame, (rows, columns) in found]
+    distance = [np.hypot(one[:, 0], one[:, 1]) for one in away]
     none = np.zeros(0, np.int64)
     return Matches(
         frame, np.concatenate([none, *person]), np.concatenate([none, *track]), np.concatenate([np.zeros(0), *distance])

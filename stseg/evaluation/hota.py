@@ -6,10 +6,9 @@ Source: Luiten et al., "HOTA: a higher order metric for evaluating multi-object 
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Floats, Ints
-from stseg.evaluation.sequence import Sequence, similarity
+from stseg.evaluation.sequence import Sequence, best_pairs, similarity
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 """Similarity thresholds of a match."""
@@ -41,22 +40,22 @@ def _hota_at(alpha: float, sequence: Sequence, pair: Ints, similar: Floats) -> f
 
 def _matches(sequence: Sequence, radius: float) -> tuple[Ints, Floats]:
     """Pair number and similarity of every match; the assignment favours pairs that agree over the whole sequence."""
-    similar = [similarity(frame.distance, radius) for frame in sequence.frames]
-    places = [np.nonzero(one) for one in similar]
-    numbers = [
-        frame.person[rows] * sequence.tracks + frame.track[columns]
-        for frame, (rows, columns) in zip(sequence.frames, places, strict=True)
-    ]
-    shares = [_shares(one)[place] for one, place in zip(similar, places, strict=True)]
+    numbers, shares = list[Ints](), list[Floats]()
+    for frame in sequence.frames:
+        similar = similarity(frame.distance, radius)
+        rows, columns = place = np.nonzero(similar)
+        numbers.append(frame.person[rows] * sequence.tracks + frame.track[columns])
+        shares.append(_shares(similar)[place])
     aligned = np.split(_alignment(sequence, numbers, shares), np.cumsum([len(number) for number in numbers])[:-1])
 
-    pairs, similarities = [], []
-    for one, place, number, alignment in zip(similar, places, numbers, aligned, strict=True):
-        score, pair = np.zeros(one.shape), np.zeros(one.shape, np.int64)
-        score[place], pair[place] = alignment * one[place], number
-        chosen = linear_sum_assignment(-score)
+    pairs, similarities = list[Ints](), list[Floats]()
+    for frame, number, alignment in zip(sequence.frames, numbers, aligned, strict=True):
+        similar = similarity(frame.distance, radius)
+        place, score, pair = np.nonzero(similar), np.zeros(similar.shape), np.zeros(similar.shape, np.int64)
+        score[place], pair[place] = alignment * similar[place], number
+        chosen = best_pairs(score)
         pairs.append(pair[chosen])
-        similarities.append(one[chosen])
+        similarities.append(similar[chosen])
     return np.concatenate(pairs), np.concatenate(similarities)
 
 

@@ -128,7 +128,7 @@ def evaluate(
     trajectory: Rows,
     gate: float = 0.5,
     area: Area | None = None,
-    frames: Ints | None = None,
+    frames: Ints | range | None = None,
     ignore_flagged: bool = False,
     align: Alignment = "none",
 ) -> Scores:
@@ -144,7 +144,7 @@ def evaluate(
     area
         Lower x, lower y, upper x, upper y, metres: people outside are ignored, as are the tracks matched to them and
         unmatched tracks outside.
-    frames : int64, optional
+    frames : int64 or range, optional
         The frames to evaluate; by default those of the truth. A frame without detections counts.
     ignore_flagged
         Treat rows of the truth with a flag other than 0 as people outside the area.
@@ -177,7 +177,7 @@ def _score(
     return Scores(
         gate=gate,
         area=area,
-        frames=len(sequence.frames),
+        frames=sequence.length,
         scale=scale,
         truths=truths,
         detections=detections,

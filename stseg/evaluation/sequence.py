@@ -6,12 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.errors import FormatError
 
 _PAIR = 1e3  # reward of a pair, metres: more than the distances of a whole frame
 _CONTINUATION_REWARD = 1e6  # reward of a continued pair, metres: more than all pairs of a frame
+_CROWD = 100_000  # people times tracks of a frame from which a crowd is divided
 
 
 def similarity(distance: Floats, radius: float) -> Floats:
@@ -42,8 +46,35 @@ def match(distance: Floats, gate: float, kept: Flags | None = None) -> tuple[Int
     gain = np.where(within_gate, _PAIR + gate - distance, 0.0)
     if kept is not None:
         gain += np.where(within_gate & kept, _CONTINUATION_REWARD, 0.0)
+    return best_pairs(gain)
+
+
+def best_pairs(gain: Floats) -> tuple[Ints, Ints]:
+    """Rows and columns of the pairs with the greatest sum of gains, float64 (n, m) of 0 or more; rows ascending.
+
+    Pairs without a gain are left out. Crowds are divided where nothing links them: else time goes with their cube.
+    """
+    if gain.size < _CROWD or not gain.any():
+        return _best_pairs_of_all(gain)
+    rows, columns = np.nonzero(gain)
+    links = coo_array((np.ones(len(rows)), (rows, len(gain) + columns)), shape=(sum(gain.shape),) * 2)
+    group = connected_components(links, directed=False)[1][rows]
+    alone = np.bincount(group, minlength=sum(gain.shape))[group] == 1
+    order = np.argsort(group, kind="stable")
+    order = order[~alone[order]]
+    pairs = [np.stack([rows[alone], columns[alone]])]
+    for one in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+        row, column = np.unique(rows[one]), np.unique(columns[one])
+        chosen = _best_pairs_of_all(gain[np.ix_(row, column)])
+        pairs.append(np.stack([row[chosen[0]], column[chosen[1]]]))
+    found = np.concatenate(pairs, axis=1)
+    first, second = found[:, np.argsort(found[0])]
+    return first, second
+
+
+def _best_pairs_of_all(gain: Floats) -> tuple[Ints, Ints]:
     rows, columns = linear_sum_assignment(-gain)
-    paired = within_gate[rows, columns]
+    paired = gain[rows, columns] > 0
     return np.asarray(rows[paired], np.int64), np.asarray(columns[paired], np.int64)
 
 
@@ -55,20 +86,32 @@ Area = tuple[float, float, float, float]
 class Frame:
     """One evaluated frame."""
 
+    index: int
+    """Its index in the list of frames."""
     person: Ints
     """int64 (n,): people of the truth, numbered from 0 over the sequence."""
     track: Ints
     """int64 (m,): tracks present, numbered likewise."""
-    distance: Floats
-    """float64 (n, m): metres between them."""
+    person_ground: Floats
+    track_ground: Floats
+    """float64 (n, 2), (m, 2): metres."""
+    reach: float
+    """Metres: distances beyond are infinite in a crowd."""
+
+    @property
+    def distance(self) -> Floats:
+        """Metres between them, float64 (n, m); made anew each time, since those of all frames fill gigabytes."""
+        return _distances(self.person_ground, self.track_ground, self.reach)
 
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """All evaluated frames, in order; a frame may be empty."""
+    """All evaluated frames, in order."""
 
+    length: int
+    """Number of frames in the list."""
     frames: tuple[Frame, ...]
-    """One entry for each frame of the list, with or without tracks."""
+    """One entry for each frame of the list that has people or tracks."""
     person_frames: Ints
     """int64 (people,): number of evaluated frames of each person, above 0."""
     track_frames: Ints
@@ -100,7 +143,7 @@ def align_frames(
     trajectory: Rows,
     gate: float,
     area: Area | None = None,
-    frames: Ints | None = None,
+    frames: Ints | range | None = None,
     ignore_flagged: bool = False,
 ) -> Sequence:
     """Align truth and tracks by frame and remove ignored rows.
@@ -125,34 +168,26 @@ def align_frames(
     """
     require_rows(truth, "truth")
     require_rows(trajectory, "tracks")
-    numbers = np.unique(truth["frame"] if frames is None else frames)
-    truth, trajectory = _rows_of(truth, numbers), _rows_of(trajectory, numbers)
+    listed = frames if isinstance(frames, range) else np.unique(truth["frame"] if frames is None else frames)
+    (truth, person_index), (trajectory, track_index) = _listed_rows(truth, listed), _listed_rows(trajectory, listed)
     relevant, evaluated = _inside(truth, area), _inside(trajectory, area)
     if ignore_flagged and "flag" in (truth.dtype.names or ()):
         relevant &= truth["flag"] == 0
     person_ground, track_ground = _ground(truth), _ground(trajectory)
-    distance_of_frames = []
-    for people, tracks in zip(_runs(truth, numbers), _runs(trajectory, numbers), strict=True):
-        distance = _distances(person_ground[people], track_ground[tracks])
+    present = np.union1d(person_index, track_index)
+    for people, tracks in zip(_runs(person_index, present), _runs(track_index, present), strict=True):
         if not (relevant[people].all() and evaluated[tracks].all()):
-            rows, columns = match(distance, gate)
+            rows, columns = match(_distances(person_ground[people], track_ground[tracks], gate), gate)
             evaluated[tracks][columns] = relevant[people][rows]
-            distance = distance[np.ix_(relevant[people], evaluated[tracks])]
-        distance_of_frames.append(distance)
-    return _number(distance_of_frames, truth["id"][relevant], trajectory["id"][evaluated])
-
-
-def _number(distance_of_frames: list[Floats], person_id: Ints, track_id: Ints) -> Sequence:
-    """Number people and tracks from 0 and cut the columns of ids into frames."""
-    _, person, person_frames = np.unique(person_id, return_inverse=True, return_counts=True)
-    _, track, track_frames = np.unique(track_id, return_inverse=True, return_counts=True)
-    sizes = np.array([distance.shape for distance in distance_of_frames], np.int64).reshape(-1, 2)
-    bounds = np.vstack([[0, 0], sizes.cumsum(axis=0)]).tolist()
-    frames = tuple(
-        Frame(person[p0:p1], track[t0:t1], distance)
-        for distance, (p0, t0), (p1, t1) in zip(distance_of_frames, bounds[:-1], bounds[1:], strict=True)
+    _, person, person_frames = np.unique(truth["id"][relevant], return_inverse=True, return_counts=True)
+    _, track, track_frames = np.unique(trajectory["id"][evaluated], return_inverse=True, return_counts=True)
+    runs = _runs(person_index[relevant], present), _runs(track_index[evaluated], present)
+    person_ground, track_ground = person_ground[relevant], track_ground[evaluated]
+    evaluated_frames = tuple(
+        Frame(index, person[people], track[tracks], person_ground[people], track_ground[tracks], 2 * gate)
+        for index, people, tracks in zip(present.tolist(), *runs, strict=True)
     )
-    return Sequence(frames, person_frames, track_frames)
+    return Sequence(len(listed), evaluated_frames, person_frames, track_frames)
 
 
 def require_rows(rows: Rows, name: str) -> None:
@@ -168,16 +203,23 @@ def require_rows(rows: Rows, name: str) -> None:
         raise FormatError(name, f"frame {frame[twice[0]]}", f"id {identity[twice[0]]} twice", "an id once a frame")
 
 
-def _rows_of(rows: Rows, numbers: Ints) -> Rows:
-    """Rows of the listed frames, sorted by frame; the order within a frame is kept, as it decides ties."""
-    rows = rows[np.isin(rows["frame"], numbers)]
-    return rows[np.argsort(rows["frame"], kind="stable")]
+def _listed_rows(rows: Rows, listed: Ints | range) -> tuple[Rows, Ints]:
+    """Rows of the listed frames by frame, in their order within one, as it decides ties; index of each one's frame."""
+    frame: Ints = rows["frame"]
+    if isinstance(listed, range):
+        index = np.where((frame >= listed.start) & (frame < listed.stop), frame - listed.start, -1)
+    else:
+        index = np.searchsorted(listed, frame)
+        index[~np.isin(frame, listed)] = -1
+    order = np.argsort(index, kind="stable")
+    order = order[index[order] >= 0]
+    return rows[order], index[order]
 
 
-def _runs(rows: Rows, numbers: Ints) -> list[slice]:
-    """Slice of each listed frame in the sorted rows."""
-    starts = np.searchsorted(rows["frame"], numbers, side="left").tolist()
-    stops = np.searchsorted(rows["frame"], numbers, side="right").tolist()
+def _runs(index: Ints, present: Ints) -> list[slice]:
+    """Slice of each frame that is present in the sorted indices of rows."""
+    starts = np.searchsorted(index, present, side="left").tolist()
+    stops = np.searchsorted(index, present, side="right").tolist()
     return [slice(start, stop) for start, stop in zip(starts, stops, strict=True)]
 
 
@@ -192,7 +234,16 @@ def _inside(rows: Rows, area: Area | None) -> Flags:
     return np.asarray((x >= area[0]) & (y >= area[1]) & (x <= area[2]) & (y <= area[3]))
 
 
-def _distances(person_ground: Floats, track_ground: Floats) -> Floats:
+def _distances(person_ground: Floats, track_ground: Floats, reach: float) -> Floats:
     """Metres between every person (n, 2) and every track (m, 2), (n, m); a judge shares no code with what it judges."""
-    distance = person_ground[:, None] - track_ground[None]
-    return np.hypot(distance[..., 0], distance[..., 1])
+    if len(person_ground) * len(track_ground) < _CROWD:
+        distance = person_ground[:, None] - track_ground[None]
+        return np.hypot(distance[..., 0], distance[..., 1])
+    partners = cKDTree(person_ground).query_ball_tree(cKDTree(track_ground), reach * (1 + 1e-9))
+    rows, columns = (
+        np.repeat(np.arange(len(partners)), [len(one) for one in partners]),
+        np.concatenate(partners).astype(np.int64),
+    )
+    distance = np.full((len(person_ground), len(track_ground)), np.inf)
+    distance[rows, columns] = np.hypot(*(person_ground[rows] - track_ground[columns]).T)
+    return distance

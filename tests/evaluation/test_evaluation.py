@@ -4,6 +4,7 @@ import importlib.util
 import json
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -385,3 +386,22 @@ def test_tracks_of_another_ground_are_laid_on_the_truth(
         aligned.location_mean > mean or mean == 0 > aligned.location_mean - 1e-6
     )
     assert aligned.scale == pytest.approx(scale if align == "similarity" else 1)
+
+
+def test_frames_without_rows_cost_nothing_and_break_continuity() -> None:
+    """Twenty million listed frames score as fifty do; between two frames that are far apart no pair continues."""
+    tracks = [(0, 7, 0.0, 0.0), (40, 7, 0.3, 0.0), (40, 8, 0.1, 0.0), (41, 8, 0.3, 0.0), (41, 7, 0.1, 0.0)]
+    truth, found = table([(0, 1, 0.0, 0.0), (40, 1, 0.0, 0.0), (41, 1, 0.0, 0.0)]), table(tracks)
+    few, many = (evaluate(truth, found, frames=frames) for frames in (np.arange(50), range(20_000_000)))
+    assert few.switches == 1 and few.frames == 50
+    assert replace(many, frames=50) == few
+
+
+def test_a_crowd_is_scored_in_parts_as_it_is_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    chance = np.random.default_rng(6)
+    ground = chance.uniform(0, 15, (400, 2))
+    rows = [(k, i, x, y) for k in range(3) for i, (x, y) in enumerate((ground + 0.1 * k).tolist())]
+    noisy = [(k, i, x, y) for (k, i, *_), (x, y) in zip(rows, chance.normal([r[2:] for r in rows], 0.2), strict=True)]
+    parted = evaluate(table(rows), table(noisy))
+    monkeypatch.setattr("stseg.evaluation.sequence._CROWD", 10**9)
+    assert parted == evaluate(table(rows), table(noisy))
