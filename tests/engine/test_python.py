@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import h5py
 import numba
 import numpy as np
@@ -24,7 +25,7 @@ from stseg.commands.main import main
 from stseg.engine.observations import as_observation
 from stseg.engine.offline.calls import called_beside, called_here
 from stseg.engine.offline.frame_range import FrameRange
-from stseg.errors import ConfigError
+from stseg.errors import ConfigError, OutputError
 from stseg.tasks.forecast import Forecast
 from stseg.tasks.warnings import crowd_warnings
 
@@ -190,6 +191,17 @@ def test_the_volume_is_read_as_it_is_indexed(tmp_path: Path) -> None:
     with h5py.File(run.path) as file:
         np.testing.assert_array_equal(run.volume.label[1:3, 0], file["/entry/occupancy/label"][1:3, 0])
     np.testing.assert_array_equal(run.volume_dataset().label.values, np.asarray(run.volume.label))
+
+
+def test_a_notebook_shows_the_plan_and_plays_the_film(tmp_path: Path) -> None:
+    run = stseg.read_run(write_small_run(tmp_path / "run.h5"))
+    assert run._repr_html_().startswith(f"<p>Run({str(run.path)!r}".replace("'", "&#x27;"))
+    assert cv2.imdecode(np.frombuffer(run.plot()._repr_png_(), np.uint8), 1).shape == run.plot().pixels.shape
+    film = run.film(tmp_path / "run.mp4", frames=(10, 12))
+    assert cv2.VideoCapture(str(film.path)).get(cv2.CAP_PROP_FRAME_COUNT) == 2
+    assert film._repr_html_().startswith("<video")
+    with pytest.raises(OutputError, match=r"run.mp4: found a file"):
+        run.film(tmp_path / "run.mp4")
 
 
 def test_every_public_name_is_there_and_no_other() -> None:

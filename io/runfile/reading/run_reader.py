@@ -8,7 +8,8 @@ from functools import cached_property
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, cast
 
 import h5py
 import numpy as np
@@ -59,6 +60,11 @@ class _TableProperty(cached_property[Rows]):
         return require_table(run.bounds, name, read_object(run.path, f"/{name}", take))
 
 
+def _above(task: str) -> ModuleType:
+    """A module of the tasks, by name: readers stand below what judges and draws a run."""
+    return import_module(f"stseg.tasks.{task}")
+
+
 @dataclass(frozen=True)
 class Run:
     """The contents of a run file.
@@ -104,6 +110,44 @@ class Run:
     def __repr__(self) -> str:
         frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"
         return f"Run({str(self.path)!r}: {self.scene}, {frames}, {len(self.cameras)} cameras)"
+
+    def _repr_html_(self) -> str:
+        return str(_above("notebook").summary_html(self))
+
+    def plot(self) -> Any:
+        """The ground from above with the tracks, a picture that notebooks show; `pixels` is uint8 (v, u, 3)."""
+        return _above("notebook").plan_picture(self)
+
+    def film(
+        self,
+        output: Path | str,
+        *,
+        frames: tuple[int | None, int | None] | None = None,
+        camera_images: bool = False,
+        overwrite: bool = False,
+        progress: Any = None,
+    ) -> Any:
+        """Write the film of the run, as `stseg report --video` does; notebooks play what this returns.
+
+        Parameters
+        ----------
+        output
+            The MP4 file.
+        frames
+            (first, stop), half open; None for all.
+        camera_images
+            Show the cameras' frames. The film then holds images of people.
+        overwrite
+            Replace an older film.
+        progress
+            As of `stseg.track`.
+
+        Raises
+        ------
+        InputError
+            Where a file exists, or the run has no such frame.
+        """
+        return _above("notebook").write_film(self, output, frames, camera_images, overwrite, progress)
 
     trajectory = _TableProperty("TRAJECTORY (n,).")
     tracks = _TableProperty("TRACK (n,).")
@@ -166,8 +210,7 @@ class Run:
     @cached_property
     def warnings(self) -> list[str]:
         """Faults of the recording and the run, one line each, as `stseg inspect` and the report list them."""
-        checks = import_module("stseg.tasks.warnings")  # by name: readers stand below the stages whose checks these are
-        return list(checks.run_warnings(self))
+        return list(_above("warnings").run_warnings(self))
 
     @property
     def volume(self) -> RunVolume:

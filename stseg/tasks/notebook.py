@@ -1,0 +1,69 @@
+"""A run in a notebook: its plan as a picture, and its film."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+from stseg.arrays import Bytes
+from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.io.outputs.whole_files import Inputs
+from stseg.io.runfile.runs import Run
+from stseg.reporting.figures import ground_figures
+from stseg.reporting.page.html import png_bytes
+from stseg.tasks.report import film, require_outputs
+
+
+@dataclass(frozen=True)
+class PlanPicture:
+    """The ground from above with the tracks; notebooks show it."""
+
+    pixels: Bytes
+    """uint8 (v, u, 3): blue, green, red."""
+
+    def __repr__(self) -> str:
+        return f"PlanPicture({self.pixels.shape[1]} x {self.pixels.shape[0]} pixels)"
+
+    def _repr_png_(self) -> bytes:
+        return png_bytes(self.pixels)
+
+
+@dataclass(frozen=True)
+class FilmFile:
+    """A film that was written; notebooks play it."""
+
+    path: Path
+    """The MP4 file."""
+
+    def _repr_html_(self) -> str:
+        data = base64.b64encode(self.path.read_bytes()).decode("ascii")
+        return f'<video controls width="960" src="data:video/mp4;base64,{data}"></video>'
+
+
+def plan_picture(run: Run) -> PlanPicture:
+    """The plan of a run."""
+    plan, _ = ground_figures(run.recording.rig, run.views, run.trajectory, None, run.names)
+    return PlanPicture(plan.picture)
+
+
+def summary_html(run: Run) -> str:
+    """A line about a run, and its plan."""
+    data = base64.b64encode(png_bytes(plan_picture(run).pixels)).decode("ascii")
+    return f'<p>{escape(repr(run))}</p><img width="450" src="data:image/png;base64,{data}">'
+
+
+def write_film(
+    run: Run,
+    output: Path | str,
+    frames: tuple[int | None, int | None] | None,
+    camera_images: bool,
+    overwrite: bool,
+    progress: Progress | Reporter | None,
+) -> FilmFile:
+    """Write the film of a run, as `stseg report --video` does."""
+    path = Path(output)
+    require_outputs(None, None, path, None, overwrite, Inputs(run.files))
+    film(run, path, frames, camera_images, reporter_of(progress), overwrite)
+    return FilmFile(path)
