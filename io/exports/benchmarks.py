@@ -48,7 +48,7 @@ def write_mot_boxes(path: Path, run: Run) -> None:
             for row in boxes
         )
         texts[f"{camera}.txt"] = "".join(lines)
-    _write_zip(path, texts.items())
+    write_zip(path, texts.items())
 
 
 def write_wildtrack(path: Path, run: Run) -> None:
@@ -70,7 +70,7 @@ def write_wildtrack(path: Path, run: Run) -> None:
         views = [{"viewNum": view, **boxes.get((*key, view), _NOT_SEEN)} for view in range(len(run.cameras))]
         people[key[0]].append({"personID": key[1], "positionID": position, "views": views})
     files = ((f"annotations_positions/{frame:08d}.json", json.dumps(rows, indent=4)) for frame, rows in people.items())
-    _write_zip(path, [("grid.json", json.dumps(about, indent=4)), *files])
+    write_zip(path, [("grid.json", json.dumps(about, indent=4)), *files])
 
 
 def wildtrack_size(grid: Grid) -> tuple[int, int]:
@@ -97,7 +97,7 @@ def _boxes_of_rows(run: Run) -> Mapping[tuple[int, int, int], Mapping[str, int]]
     return {key: dict(zip(_NOT_SEEN, values, strict=True)) for key, values in zip(keys, edges, strict=True)}
 
 
-def _write_zip(path: Path, texts: Iterable[tuple[str, str]]) -> None:
+def write_zip(path: Path, texts: Iterable[tuple[str, str]]) -> None:
     """A zip of text files that is the same whenever it is written."""
     with ZipFile(path, "w") as archive:
         archive.comment = MARK

@@ -31,6 +31,21 @@ def _of_mot_boxes(path: Path) -> int:
         return sum(archive.read(name).count(b"\n") for name in archive.namelist())
 
 
+def _of_coco(path: Path) -> int:
+    return len(json.loads(path.read_bytes())["annotations"])
+
+
+def _of_cvat(path: Path) -> int:
+    with ZipFile(path) as archive:
+        return sum(archive.read(name).count(b' outside="0" ') for name in archive.namelist())
+
+
+def _of_label_studio(path: Path) -> int:
+    with ZipFile(path) as archive:
+        tasks = [json.loads(archive.read(name))[0] for name in archive.namelist()]
+    return sum(len(one["value"]["sequence"]) for task in tasks for one in task["annotations"][0]["result"])
+
+
 def _of_wildtrack(path: Path) -> int:
     with ZipFile(path) as archive:
         files = [archive.read(name) for name in archive.namelist() if name.startswith("annotations_positions/")]
@@ -63,6 +78,9 @@ ROW_COUNTS: Mapping[str, Callable[[Path], int]] = {
     **dict.fromkeys(("movement", "movement-boxes"), _of_movement),
     "parquet": _of_parquet,
     "mot-boxes": _of_mot_boxes,
+    "coco": _of_coco,
+    "cvat": _of_cvat,
+    "label-studio": _of_label_studio,
     "wildtrack": _of_wildtrack,
     "jupedsim": _of_jupedsim,
     "mf-json": _of_moving_features,

@@ -7,6 +7,7 @@ import sqlite3
 import sys
 import warnings
 from contextlib import closing
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
@@ -33,18 +34,22 @@ from stseg.commands.main import main
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.io.detections.box_files import read_boxes
+from stseg.io.detections.source_detections import read_source
 from stseg.io.exports.benchmarks import wildtrack_positions, wildtrack_size
 from stseg.io.exports.formats import FORMATS
 from stseg.io.exports.geographic import BEGINNING
 from stseg.io.exports.movement import headings
+from stseg.io.exports.row_counts import ROW_COUNTS
 from stseg.io.extras import load_extra
+from stseg.io.recording.recording import Source
 from stseg.io.runfile.runs import Run, read_run
-from stseg.records.tables import TRAJECTORY
+from stseg.records.tables import BOX, TRAJECTORY
 
 with warnings.catch_warnings():  # it tells on import of what it could do with more libraries
     warnings.simplefilter("ignore")
     import movingpandas
 
+EDGES = ("left", "top", "width", "height")
 WILDTRACK = Grid((-3.0, 9.0), (-9.0, 27.0))
 
 
@@ -211,6 +216,28 @@ def test_mot_boxes_are_one_file_a_camera_that_reads_as_boxes(run: Run, path: Pat
         assert archive.read("right.txt") == b""
         boxes = read_boxes(Path(archive.extract("left.txt", path.parent)), first_frame=1)
     assert (boxes.frame.tolist(), boxes.pixel.tolist()) == ([10], [[1.0, 2.0, 3.0, 4.0]])
+
+
+@pytest.mark.parametrize(("name", "of_camera"), [("coco", ""), ("cvat", "{}.xml"), ("label-studio", "{}.json")])
+def test_mended_annotations_come_back_as_boxes(run: Run, path: Path, name: str, of_camera: str) -> None:
+    """People come, are hidden for a frame and go, in two views."""
+    path = path.with_suffix(".json")
+    boxes = table_of(BOX, frame=[10, 11, 13, 14, 15, 12], id=[1, 1, 1, 2, 2, 2], view=[0, 0, 0, 0, 0, 1])
+    for k, edge in enumerate(EDGES):
+        boxes[edge] = np.arange(6) + 10 * k + 1.25
+    rich = replace(run)
+    rich.__dict__["boxes"] = boxes
+    FORMATS[name].write(path, rich)
+    assert ROW_COUNTS[name](path) == 6
+    for view, camera in enumerate(run.recording.rig.cameras):
+        file, first = path, int(FRAMES[0])  # a list of images counts from its first
+        if of_camera:
+            with ZipFile(path) as archive:
+                file, first = Path(archive.extract(of_camera.format(camera.name), path.parent)), 0
+        table = read_source(Source("boxes", file, select="" if of_camera else f"{camera.name}/*"), camera.size).table
+        rows = boxes[boxes["view"] == view]
+        np.testing.assert_array_equal(table.frame + first, rows["frame"])
+        np.testing.assert_allclose(table.pixel, [[row[edge] for edge in EDGES] for row in rows], atol=0.01)
 
 
 def wildtrack_files(path: Path) -> tuple[dict[str, Any], dict[int, list[dict[str, Any]]]]:

@@ -1,0 +1,106 @@
+"""Boxes of all views as annotations that people mend: COCO, CVAT and Label Studio.
+
+Frames are the recording's, and edges are pixels of the real image. `stseg` reads each of these formats as boxes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.io.exports.benchmarks import write_zip
+from stseg.io.outputs.whole_files import MARK
+from stseg.io.runfile.reading.run_reader import Run
+
+_EDGES = ("left", "top", "width", "height")
+_PERSON = "person"
+
+
+def write_coco(path: Path, run: Run) -> None:
+    """Write a COCO data set: an image `CAMERA/FRAME.png` for each view of each frame, boxes with `track_id`."""
+    cameras = run.recording.rig.cameras
+    images = [
+        {"id": view + 1 + index * len(cameras), "file_name": f"{camera.name}/{frame:06d}.png",
+         "width": camera.size[0], "height": camera.size[1], "frame": frame}
+        for index, frame in enumerate(run.frames.tolist())
+        for view, camera in enumerate(cameras)
+    ]  # fmt: skip
+    image = run.boxes["view"] + 1 + np.searchsorted(run.frames, run.boxes["frame"]) * len(cameras)
+    annotations = [
+        {"id": k + 1, "image_id": int(number), "category_id": 1, "track_id": int(row["id"]), "iscrowd": 0,
+         "bbox": [round(float(row[name]), 2) for name in _EDGES],
+         "area": round(float(row["width"]) * float(row["height"]), 2)}
+        for k, (number, row) in enumerate(zip(image.tolist(), run.boxes, strict=True))
+    ]  # fmt: skip
+    about = {"description": f"{run.scene}, {MARK.decode()}"}
+    categories = [{"id": 1, "name": _PERSON}]
+    data = {"info": about, "images": images, "annotations": annotations, "categories": categories}
+    path.write_text(json.dumps(data), encoding="utf-8")
+
+
+def write_cvat(path: Path, run: Run) -> None:
+    """Write a zip of CVAT's XML 1.1 for videos, `CAMERA.xml` each: a track a person, a box in each frame."""
+    write_zip(path, ((f"{camera}.xml", _cvat(run, view)) for view, camera in enumerate(run.cameras)))
+
+
+def _cvat(run: Run, view: int) -> str:
+    size, stop = run.recording.rig.cameras[view].size, int(run.frames[-1]) + 1 if len(run.frames) else 0
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>', "<annotations>", "<version>1.1</version>", "<meta><task>",
+        f"<size>{stop}</size><mode>interpolation</mode>", f"<labels><label><name>{_PERSON}</name></label></labels>",
+        f"<original_size><width>{size[0]}</width><height>{size[1]}</height></original_size>", "</task></meta>",
+    ]  # fmt: skip
+    for identity, rows in _tracks(run, view):
+        lines.append(f'<track id="{identity}" label={quoteattr(_PERSON)}>')
+        ends = np.append(np.diff(rows["frame"]) > 1, True)
+        for row, is_end in zip(rows, ends.tolist(), strict=True):
+            lines.append(_cvat_box(row, int(row["frame"]), 0))
+            if is_end and row["frame"] + 1 < stop:
+                lines.append(_cvat_box(row, int(row["frame"]) + 1, 1))
+        lines.append("</track>")
+    return "\n".join([*lines, "</annotations>", ""])
+
+
+def _cvat_box(row: Rows, frame: int, outside: int) -> str:
+    left, top, width, height = (float(row[name]) for name in _EDGES)
+    edges = f'xtl="{left:.2f}" ytl="{top:.2f}" xbr="{left + width:.2f}" ybr="{top + height:.2f}"'
+    return f'<box frame="{frame}" outside="{outside}" occluded="0" keyframe="1" {edges} z_order="0"></box>'
+
+
+def write_label_studio(path: Path, run: Run) -> None:
+    """Write a zip of Label Studio's tasks, `CAMERA.json` each: a video rectangle a person, a keyframe in each frame."""
+    write_zip(path, ((f"{camera}.json", json.dumps(_task(run, view))) for view, camera in enumerate(run.cameras)))
+
+
+def _task(run: Run, view: int) -> list[dict[str, object]]:
+    size, stop = run.recording.rig.cameras[view].size, int(run.frames[-1]) + 1 if len(run.frames) else 0
+    result = [
+        {"id": f"track{identity}", "type": "videorectangle", "from_name": "box", "to_name": "video",
+         "value": {"framesCount": stop, "labels": [_PERSON], "sequence": _keyframes(rows, size, run.frame_rate)}}
+        for identity, rows in _tracks(run, view)
+    ]  # fmt: skip
+    return [{"data": {"video": f"{run.cameras[view]}.mp4"}, "annotations": [{"result": result}]}]
+
+
+def _keyframes(rows: Rows, size: tuple[int, int], frame_rate: float) -> list[dict[str, object]]:
+    """Frames count from 1 there, and edges are percent; a box is there until a keyframe that is not enabled."""
+    goes_on = np.append(np.diff(rows["frame"]) == 1, False)
+    return [
+        {"frame": int(row["frame"]) + 1, "time": round(float(row["frame"]) / frame_rate, 3), "rotation": 0,
+         "enabled": is_on, "x": 100 * float(row["left"]) / size[0], "y": 100 * float(row["top"]) / size[1],
+         "width": 100 * float(row["width"]) / size[0], "height": 100 * float(row["height"]) / size[1]}
+        for row, is_on in zip(rows, goes_on.tolist(), strict=True)
+    ]  # fmt: skip
+
+
+def _tracks(run: Run, view: int) -> Iterator[tuple[int, Rows]]:
+    """Boxes of one view, track by track in the order of frames."""
+    boxes = run.boxes[run.boxes["view"] == view]
+    boxes = boxes[np.lexsort((boxes["frame"], boxes["id"]))]
+    for identity in np.unique(boxes["id"]).tolist():
+        yield identity, boxes[boxes["id"] == identity]
