@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 from zipfile import BadZipFile
 
-from stseg.io.exports import annotations, benchmarks, geographic, movement, tables
+from stseg.io.exports import benchmarks, geographic, labelling, movement, tables
 from stseg.io.exports.row_counts import ROW_COUNTS
 from stseg.io.runfile.reading.run_reader import Run
 
@@ -42,10 +42,10 @@ FORMATS: Mapping[str, ExportFormat] = {
     "mot-boxes": ExportFormat(
         benchmarks.write_mot_boxes, "a zip of 2-D MOTChallenge lines, one file a camera", "boxes"
     ),
-    "coco": ExportFormat(annotations.write_coco, "a COCO data set of the boxes in all views", "boxes"),
-    "cvat": ExportFormat(annotations.write_cvat, "a zip of CVAT's XML for videos, one file a camera", "boxes"),
+    "coco": ExportFormat(labelling.write_coco, "a COCO data set of the boxes in all views", "boxes"),
+    "cvat": ExportFormat(labelling.write_cvat, "a zip of CVAT's XML for videos, one file a camera", "boxes"),
     "label-studio": ExportFormat(
-        annotations.write_label_studio, "a zip of Label Studio's tasks, one file a camera", "boxes"
+        labelling.write_label_studio, "a zip of Label Studio's tasks, one file a camera", "boxes"
     ),
     "wildtrack": ExportFormat(
         benchmarks.write_wildtrack, "a zip of WILDTRACK's annotations_positions, and the grid that they use"

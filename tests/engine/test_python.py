@@ -196,7 +196,8 @@ def test_the_volume_is_read_as_it_is_indexed(tmp_path: Path) -> None:
 def test_a_notebook_shows_the_plan_and_plays_the_film(tmp_path: Path) -> None:
     run = stseg.read_run(write_small_run(tmp_path / "run.h5"))
     assert run._repr_html_().startswith(f"<p>Run({str(run.path)!r}".replace("'", "&#x27;"))
-    assert cv2.imdecode(np.frombuffer(run.plot()._repr_png_(), np.uint8), 1).shape == run.plot().pixels.shape
+    shown = cv2.imdecode(np.frombuffer(run.plot()._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
+    assert shown is not None and shown.shape == run.plot().pixels.shape
     film = run.film(tmp_path / "run.mp4", frames=(10, 12))
     assert cv2.VideoCapture(str(film.path)).get(cv2.CAP_PROP_FRAME_COUNT) == 2
     assert film._repr_html_().startswith("<video")
