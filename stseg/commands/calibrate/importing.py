@@ -150,8 +150,8 @@ def _require_front(foreign: Sequence[ForeignCamera], rig: Rig, world: World) -> 
     """Name a mirrored world, in which the cameras that look at the area have it behind them, and an area left in it."""
     (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
     if world.mirrored and _sees_area(replace(rig, grid=replace(rig.grid, y=(-y1, -y0), polygon=None))):
-        there = f"--area={x0:g},{-y1:g},{x1:g},{-y0:g}: --mirrored reverses y"
-        raise ConfigError("--area", "", f"an area that no view shows, y {y0:g} to {y1:g}", there)
+        reversed_area = f"--area={x0:g},{-y1:g},{x1:g},{-y0:g}: --mirrored reverses y"
+        raise ConfigError("--area", "", f"an area that no view shows, y {y0:g} to {y1:g}", reversed_area)
     if all(is_mirrored(camera, rig.grid) for camera in rig.cameras):
         found = "a mirrored world, in which the area lies behind every camera"
         undo = "without --mirrored" if world.mirrored else "--mirrored, where the calibration is left-handed"
