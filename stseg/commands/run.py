@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -85,7 +83,7 @@ def run(
     """
     if scheduler is None and not follow:
         prepare_workers(workers)  # they import the stages while this process does: nothing is imported before
-    from stseg.commands.terminal.standard_error import TerminalReporter
+    from stseg.commands.terminal.standard_error import TerminalReporter, warn
     from stseg.engine.offline.frame_range import FrameRange
     from stseg.engine.track import track_recording
     from stseg.engine.workers.workforce import Workforce
@@ -112,7 +110,7 @@ def run(
         if followed is None:
             print(f"{output}: not written, since nothing came")
         else:
-            _warn(followed.run.warnings)
+            warn(followed.run.warnings)
             print(f"{_summary(followed.run)}{followed.delay}")
         return
     if labels is not None:
@@ -124,20 +122,15 @@ def run(
         pixels, inputs = require_pixels(recording), Inputs(recording_files(recording))
         require_label_folder(labels, [recording.rig.cameras[k].name for k in pixels], overwrite, inputs)
     earlier = source_warnings(recording)
-    _warn(earlier)
+    reporter = TerminalReporter(earlier)
     done = track_recording(
         recording, output, resolved, tracker, volume, chosen, workforce, reporter, known=known, overwrite=overwrite
     )
-    _warn(words for words in done.warnings if words not in earlier)
+    warn(words for words in done.warnings if words not in earlier)
     print(_summary(done))
     if labels is not None:
         count = label_images(done, labels, config=resolved, overwrite=overwrite, progress=reporter)
         print(f"{labels}: {count} label images")
-
-
-def _warn(warnings: Iterable[str]) -> None:
-    for warning in warnings:
-        print(f"stseg: warning: {warning}", file=sys.stderr)
 
 
 def _require_alone(workers: int | None, scheduler: str | None, labels: Path | None, known: Path | None) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import faulthandler
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from io import TextIOWrapper
 
 
@@ -35,10 +35,27 @@ def frame_bar(work: str, total: int | None, done: int = 0) -> Iterator[Callable[
         yield lambda more: bar.advance(task, more)
 
 
-class TerminalReporter:
-    """The engine's notes and progress on standard error (`stseg.engine.reporter.Reporter`)."""
+def warn(warnings: Iterable[str]) -> None:
+    """Print warnings, a line each."""
+    for warning in warnings:
+        print(f"stseg: warning: {warning}", file=sys.stderr)
 
-    progress = staticmethod(frame_bar)
+
+class TerminalReporter:
+    """The engine's notes and progress on standard error (`stseg.engine.reporter.Reporter`).
+
+    `warnings` are printed once work on a known number of frames begins: what is refused before is one line.
+    """
+
+    def __init__(self, warnings: Sequence[str] = ()) -> None:
+        self._warnings = list(warnings)
+
+    def progress(self, work: str, total: int | None, done: int = 0) -> AbstractContextManager[Callable[[int], None]]:
+        """A bar, see `frame_bar`."""
+        if total is not None:
+            warn(self._warnings)
+            self._warnings.clear()
+        return frame_bar(work, total, done)
 
     @staticmethod
     def note(line: str) -> None:
