@@ -11,6 +11,7 @@ from tempfile import mkdtemp
 
 from stseg.config import Config
 from stseg.config.keys import require_effect
+from stseg.engine.memory import require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.detected_boxes import with_boxes
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
@@ -150,6 +151,8 @@ def track_recording(
     """
     require_effect(config, tracker)
     config = with_body_of(recording, config)
+    if workforce.scheduler is None:
+        require_memory(recording.rig, config, recording.path)
     boxes = output.with_name(f"{output.name}.boxes")
     recording = with_boxes(recording, boxes, reporter, overwrite)
     people = NO_KNOWN_PEOPLE if known is None else read_known(known, config)

@@ -9,6 +9,7 @@ import numpy as np
 from stseg.arrays import Boxes, Bytes, Observation, Rows
 from stseg.config import Config
 from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.memory import require_memory
 from stseg.engine.observations import PEOPLE, Views, as_observation, in_rig_order
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import Session
@@ -60,6 +61,7 @@ class Tracker:
         empty: Mapping[str, Iterable[Bytes]] | None = None,
         classes: Sequence[int] = PEOPLE,
     ) -> None:
+        require_memory(rig, config or Config(), "rig")
         rig.require_coverage()
         self.rig, self.config, self._tracker = rig, config or Config(), tracker
         self._empty = {name: list(images) for name, images in (empty or {}).items()}

@@ -10,6 +10,7 @@ from time import perf_counter, process_time
 
 from stseg.config import Config
 from stseg.config.keys import require_effect
+from stseg.engine.memory import require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
@@ -93,6 +94,7 @@ def plan(
     recording = recording_of(rig)
     resolved = with_body_of(recording, config_of(config))
     require_effect(resolved, tracker)
+    require_memory(recording.rig, resolved, recording.path)
     begin = perf_counter()
     streams = index_streams(recording)
     counting = perf_counter() - begin

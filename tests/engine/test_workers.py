@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from multiprocessing import active_children
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -17,9 +18,16 @@ from typing import NamedTuple
 import pytest
 from recordings import ENVIRONMENT, assert_same, compiled_only, run_words, track, write_recording
 from refusals import Command
+from scenes import corner_cameras, rig_of
 
+import stseg
+from stseg.config import Config
+from stseg.engine.memory import process_memory
 from stseg.engine.workers import worker_processes
 from stseg.engine.workers.worker_processes import processes_that_fit
+from stseg.errors import ConfigError
+from stseg.geometry import Grid
+from stseg.io.recording.rigs import read_recording
 
 pytestmark = compiled_only
 
@@ -144,4 +152,34 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
     ("ground_side", "views", "processes"), [(6, 4, 11), (20, 7, 5), (40, 8, 1), (400, 8, 1)]
 )  # one of 20 m and 7 views was measured at 0.9 GiB, one of 40 m and 7 views at 3.8 GiB
 def test_a_large_ground_leaves_room_for_fewer(ground_side: int, views: int, processes: int) -> None:
-    assert processes_that_fit(views * 10 * (10 * ground_side) ** 2) == processes
+    grid = Grid((0.0, ground_side), (0.0, ground_side))
+    rig = replace(rig_of(corner_cameras()[:1] * views), grid=grid)
+    assert processes_that_fit(process_memory(rig, Config())) == processes
+
+
+@pytest.mark.parametrize(
+    ("side", "cell", "key", "remedy"),
+    [
+        (40.0, 0.05, "grid.cell: found 0.05, whose 6.4e+06 cells take about", "larger cells"),
+        (800.0, 2.0, "scene.x, scene.y: found 800 m x 800 m, which take about", "are these centimetres?"),
+        (1e8, 1e3, "scene.x, scene.y: found 1e+08 m x 1e+08 m", "are these centimetres?"),
+    ],
+)
+def test_a_ground_beyond_the_memory_is_refused(
+    side: float, cell: float, key: str, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before any work, with the number, the key and what to do; by a run, a forecast and a tracker in memory alike."""
+    monkeypatch.setattr("stseg.engine.memory.free_memory", lambda: 8 * 2**30)
+    rig = replace(rig_of(corner_cameras()[:1] * 8), grid=Grid((0.0, side), (0.0, side), cell))
+    recording = read_recording(write_recording(tmp_path))
+    large = replace(recording, rig=replace(recording.rig, grid=rig.grid, cameras=recording.rig.cameras[:1] * 8))
+    large = replace(large, sources=large.sources[:1] * 8)
+    calls: list[Callable[[], object]] = [
+        lambda: stseg.Tracker(rig),
+        lambda: stseg.plan(large),
+        lambda: stseg.track(large, tmp_path / "run.h5"),
+    ]
+    for called in calls:
+        with pytest.raises(ConfigError) as error:
+            called()
+        assert key in str(error.value) and remedy in str(error.value) and "8.0 GiB that are free" in str(error.value)

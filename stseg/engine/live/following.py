@@ -13,6 +13,7 @@ from stseg.config import Config
 from stseg.config.keys import require_effect
 from stseg.engine.live.live_foreground import LiveForegrounds
 from stseg.engine.live.live_run import LiveRun
+from stseg.engine.memory import require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.backgrounds import background_frames
 from stseg.engine.offline.frame_range import FrameRange
@@ -93,6 +94,7 @@ def follow_recording(
     """
     require_effect(config, tracker)
     config = with_body_of(recording, config)
+    require_memory(recording.rig, config, recording.path)
     is_live(recording)  # raises where the sources cannot be followed
     job = Job(recording, config, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
     request = run_request(recording, gather_provenance(recording, format_config(config)))

@@ -25,18 +25,13 @@ CONTEXT: ForkServerContext | SpawnContext = (
 """Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
 
 _PRELOADED = "stseg.engine.workers.preloaded"
-_MEMORY = 650 * 2**20
+PROCESS_MEMORY = 650 * 2**20
 """Memory that a process of a run is taken to need on a small ground, bytes."""
-_CELL_MEMORY = 350
-"""The same of each cell and view, bytes: tables of footprints and outlines, and the volumes of a window."""
 
 
-def processes_that_fit(cells: int = 0) -> int:
-    """Number of processes of a run for which this machine has cores and free memory, 1 at least.
-
-    `cells` is the number of the volume's cells times that of the views.
-    """
-    return max(1, min(free_cores(), free_memory() // (_MEMORY + cells * _CELL_MEMORY)))
+def processes_that_fit(memory: int = PROCESS_MEMORY) -> int:
+    """Number of processes of a run for which this machine has cores and free memory, bytes each, 1 at least."""
+    return max(1, min(free_cores(), free_memory() // memory))
 
 
 def prepare_workers(workers: int | None) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import prod
 from pathlib import Path
 
+from stseg.engine.memory import process_memory
 from stseg.engine.offline.calls import Caller, called_beside, called_here
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
@@ -40,8 +40,7 @@ class Workforce:
         """Number of processes of this machine."""
         if self.workers is not None:
             return self.workers
-        rig = job.recording.rig
-        return processes_that_fit(len(rig.cameras) * prod(rig.grid.shape))
+        return processes_that_fit(process_memory(job.recording.rig, job.config))
 
     def prepare(self) -> None:
         """Make ready what takes time, while the recording is counted."""
