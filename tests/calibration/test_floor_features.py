@@ -59,7 +59,7 @@ def test_a_bare_floor_has_no_marks(cameras: tuple[Camera, ...]) -> None:
 
 
 def test_marks_bring_cameras_nearer_to_the_truth() -> None:
-    scene = walking(2, 2, 40.0, noise=2.0)
+    scene = walking(2, 2, 12.0, noise=2.0)
     single_cameras = single_view_cameras(scene.views, lambda: None)
     paths = view_paths(scene.views, single_cameras)
     merged = merge_views(paths, align_all(paths, 5.0, 0, lambda: None))
