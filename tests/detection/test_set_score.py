@@ -8,20 +8,10 @@ from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Floats
 from stseg.bodies.outlines import paint_outlines
+from stseg.detection.score.gains import gain
+from stseg.detection.score.moves import add, fill_gains, put, release, remove, return_to, withdraw
 from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_score, pixel_score, set_score
-from stseg.detection.score.set_state import (
-    Kept,
-    SetState,
-    add,
-    fill_gains,
-    gain,
-    put,
-    release,
-    remove,
-    return_to,
-    set_state,
-    withdraw,
-)
+from stseg.detection.score.set_state import Kept, SetState, set_state
 from stseg.detection.score.track_state import assign_track, release_track, track_gain, track_state
 from stseg.kernels.accelerate import kernel
 from stseg.kernels.pointed_tuples import pointed

@@ -13,7 +13,8 @@ import numpy as np
 
 from stseg.arrays import Ints
 from stseg.detection.problem import DetectionProblem
-from stseg.detection.score.set_state import SetState, add, put, release, remove, set_state
+from stseg.detection.score.moves import add, put, release, remove
+from stseg.detection.score.set_state import SetState, set_state
 from stseg.detection.search.groups import fill_groups
 from stseg.detection.search.local_search import SCORE_TOLERANCE, local_search, swap_moves
 from stseg.kernels.accelerate import kernel

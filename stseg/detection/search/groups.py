@@ -45,8 +45,9 @@ def mark_interacting(i: int, state: SetState, linked: Flags) -> None:
     for k in range(neighbours.start[i], neighbours.start[i + 1]):
         if neighbours.value[k] > 0:
             linked[neighbours.item[k]] = True
-    for row in range(i, len(state.overlapping.start) - 1, candidates):
-        _mark_row(row, state.overlapping, linked)
+    overlapping = state.pixels.overlapping
+    for row in range(i, len(overlapping.start) - 1, candidates):
+        _mark_row(row, overlapping, linked)
     for k in range(tracks.gains.start[i], tracks.gains.start[i + 1]):
         _mark_row(tracks.gains.item[k], tracks.followers, linked)
     for view in range(boxes.views):

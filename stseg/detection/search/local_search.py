@@ -11,17 +11,9 @@ import numpy as np
 
 from stseg.arrays import Flags, Ints
 from stseg.detection.problem import DetectionProblem
-from stseg.detection.score.set_state import (
-    REPLACEMENT_DISTANCE,
-    SetState,
-    add,
-    copy_of,
-    gain,
-    put,
-    remove,
-    return_to,
-    withdraw,
-)
+from stseg.detection.score.gains import gain
+from stseg.detection.score.moves import add, copy_of, put, remove, return_to, withdraw
+from stseg.detection.score.set_state import REPLACEMENT_DISTANCE, SetState
 from stseg.detection.search.groups import mark_interacting
 from stseg.kernels.accelerate import kernel, part
 

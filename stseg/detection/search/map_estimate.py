@@ -17,8 +17,8 @@ from stseg.bodies.views import BoxView, PixelView
 from stseg.detection.evidence.candidate_evidence import ProjectedBodies
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.detection.problem import DetectionProblem
+from stseg.detection.score.moves import fill_gains
 from stseg.detection.score.scoring import fill_box_assignment, fill_set_score
-from stseg.detection.score.set_state import fill_gains
 from stseg.detection.search.best_set import GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates

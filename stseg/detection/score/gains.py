@@ -1,0 +1,81 @@
+"""Gains of candidates: the change of the score with one more member, or without one (`scoring.set_score`).
+
+Gains are kept, view by view, until a member comes or goes that they depend on.
+"""
+
+from __future__ import annotations
+
+from stseg.arrays import Floats
+from stseg.detection.score.box_state import box_gain, box_part
+from stseg.detection.score.pixel_state import assign_in_view, overlaps, pixel_gain, pixel_part, reassign_pixels
+from stseg.detection.score.set_state import SetState
+from stseg.detection.score.track_state import assign_track, release_track, track_after, track_gain
+from stseg.kernels.accelerate import kernel
+
+
+@kernel
+def gain(i: int, absent: int, state: SetState) -> float:
+    """Gain of candidate i as a further member, or what member i is worth, nats; it is kept until a move changes it.
+
+    With a member who is `absent` for the while (`withdraw`, then `put` without a move), what depends on that member is
+    computed and not kept; -1 where all are there.
+    """
+    problem, boxes, pixels, is_member = state.problem, state.boxes, state.pixels, state.inside[i]
+    candidates, views = len(state.inside), len(pixels.evidence.raster)
+    whole = (boxes.views + views) * candidates + i
+    if absent < 0 and state.is_known[whole]:
+        return float(state.gains[whole])
+    state.remaining[0] -= 1
+    total = problem.parameters.prior_log_odds + problem.size_prior[i] - problem.birth_cost[i]
+    for k in range(state.neighbours.start[i], state.neighbours.start[i + 1]):
+        total -= state.neighbours.value[k] if state.inside[state.neighbours.item[k]] else 0.0
+    pixel_sum = 0.0
+    for view in range(views):
+        row = view * candidates + i
+        known = boxes.views * candidates + row
+        is_kept = absent < 0 or not overlaps(row, absent, pixels.overlapping)
+        if is_kept and state.is_known[known]:
+            pixel_sum += state.gains[known]
+            continue
+        if is_member:
+            reassign_pixels(view, i, state.inside, pixels)
+        gained = pixel_gain(view, i, pixels)
+        if is_member:
+            assign_in_view(view, i, pixels)
+        if is_kept:
+            state.gains[known], state.is_known[known] = gained, True
+        pixel_sum += gained
+    total += problem.parameters.effective_observations * pixel_sum
+    state.inside[i] = False
+    if is_member:
+        release_track(i, state.inside, state.tracks)
+    total += track_gain(i, state.tracks)
+    if is_member:
+        assign_track(i, state.tracks)
+    for view in range(boxes.views):
+        row = view * candidates + i
+        if absent >= 0:
+            total += box_gain(view, i, state.inside, boxes, problem.parameters)
+            continue
+        if not state.is_known[row]:
+            state.gains[row] = box_gain(view, i, state.inside, boxes, problem.parameters)
+            state.is_known[row] = True
+        total += state.gains[row]
+    state.inside[i] = is_member
+    if absent < 0:
+        state.gains[whole], state.is_known[whole] = total, True
+    return float(total)
+
+
+@kernel
+def fill_evidence(i: int, state: SetState, parts: Floats) -> int:
+    """Fill parts (view,) with the evidence of each view for candidate i as a further member, nats; returns its track.
+
+    That is the number of a predicted track, -1 for a birth. Views with boxes come first.
+    """
+    boxes, parameters = state.boxes, state.problem.parameters
+    for view in range(boxes.views):
+        parts[view] = box_part(view, i, state.inside, boxes, parameters)
+    for view in range(len(state.pixels.evidence.raster)):
+        parts[boxes.views + view] = parameters.effective_observations * pixel_part(view, i, state.pixels)
+    return track_after(i, state.tracks)

@@ -1,0 +1,148 @@
+"""Moves of a set's state: a member comes or goes, evidence is assigned anew, and gains that depend on it are forgotten.
+
+The work of a move is that of its neighbourhood.
+"""
+
+from __future__ import annotations
+
+from stseg.arrays import Floats, Ints
+from stseg.detection.problem import DetectionProblem, RaggedArray
+from stseg.detection.score.box_state import link
+from stseg.detection.score.gains import fill_evidence, gain
+from stseg.detection.score.pixel_state import assign_pixels, reassign_pixels, release_pixels
+from stseg.detection.score.set_state import Kept, SetState, set_state
+from stseg.detection.score.track_state import assign_track, linked_tracks, release_track
+from stseg.kernels.accelerate import kernel, part
+from stseg.kernels.pointed_tuples import pointed
+
+
+@kernel
+def add(i: int, place: int, state: SetState) -> None:
+    """Add candidate i to the set at a place, from where the member goes to the last one."""
+    state.total[0] += gain(i, -1, state)
+    _forget(i, state)
+    put(i, place, state)
+
+
+@kernel
+def remove(place: int, state: SetState) -> None:
+    """Remove the member at a place from the set; the last member moves there."""
+    state.total[0] -= gain(state.members[place], -1, state)
+    _forget(withdraw(place, state), state)
+
+
+@kernel
+def put(i: int, place: int, state: SetState) -> None:
+    """Put candidate i at a place of the set, and back again after it was withdrawn from it; gains are kept."""
+    members, size = state.members, state.size
+    members[size[0]] = members[place]
+    members[place], state.inside[i] = i, True
+    size[0] += 1
+    assign_pixels(i, state.pixels)
+    assign_track(i, state.tracks)
+
+
+@kernel
+def withdraw(place: int, state: SetState) -> int:
+    """Take the member at a place out of the set, and keep the gains; returns the candidate."""
+    members, size, i = state.members, state.size, int(state.members[place])
+    size[0] -= 1
+    members[place], state.inside[i] = members[size[0]], False
+    for view in range(len(state.pixels.evidence.raster)):
+        reassign_pixels(view, i, state.inside, state.pixels)
+    release_track(i, state.inside, state.tracks)
+    return i
+
+
+@kernel
+def _forget(i: int, state: SetState) -> None:
+    """Forget the gains that depend on whether candidate i, outside now, is in the set."""
+    candidates, boxes, overlapping, tracks = len(state.inside), state.boxes, state.pixels.overlapping, state.tracks
+    state.moves[0] += 1
+    whole = boxes.views + len(state.pixels.evidence.raster)
+    _forget_part(whole, i, state)
+    for k in range(state.neighbours.start[i], state.neighbours.start[i + 1]):
+        if state.neighbours.value[k] > 0:
+            _forget_part(whole, state.neighbours.item[k], state)
+    for row in range(i, len(overlapping.start) - 1, candidates):
+        _forget_row(boxes.views + row // candidates, row, overlapping, state)
+    for r in range(linked_tracks(i, state.inside, tracks)):
+        _forget_row(whole, tracks.reached[r], tracks.followers, state)
+    for view in range(boxes.views):
+        _forget_row(view, view * candidates + i, boxes.hidden, state)
+        for a in range(link(view, i, state.inside, boxes)):
+            row = view * candidates + boxes.linked[a]
+            _forget_row(view, row, boxes.hiders, state)
+            for k in range(boxes.fits.start[row], boxes.fits.start[row + 1]):
+                _forget_row(view, view * boxes.boxes + boxes.fits.item[k], boxes.fitting, state)
+
+
+@part
+def _forget_row(number: int, row: int, rows: RaggedArray, state: SetState) -> None:
+    """Forget a part of the gains of all candidates of a row."""
+    for k in range(rows.start[row], rows.start[row + 1]):
+        _forget_part(number, rows.item[k], state)
+
+
+@part
+def _forget_part(number: int, i: int, state: SetState) -> None:
+    """Forget a part of a candidate's gain, and the whole."""
+    candidates = len(state.inside)
+    state.is_known[number * candidates + i] = state.is_known[len(state.is_known) - candidates + i] = False
+    state.changed[i] = state.moves[0]
+
+
+@kernel
+def copy_of(state: SetState) -> Kept:
+    """All that is known of a set now."""
+    return Kept(state.kept.numbers.copy(), state.kept.values.copy(), state.kept.flags.copy())
+
+
+@kernel
+def return_to(before: Kept, state: SetState) -> None:
+    """Take back the moves since a copy was made, without forgetting the gains of then."""
+    for a in range(state.size[0] - 1, -1, -1):
+        if not before.flags[state.members[a]]:
+            withdraw(a, state)
+    for i in range(len(state.inside)):
+        if before.flags[i] and not state.inside[i]:
+            put(i, state.size[0], state)
+    for k in range(len(before.numbers)):  # in loops, since slices that are assigned to are slow to compile
+        state.kept.numbers[k] = before.numbers[k]
+    for k in range(len(before.values)):
+        state.kept.values[k] = before.values[k]
+    for k in range(len(before.flags)):
+        state.kept.flags[k] = before.flags[k]
+
+
+@kernel
+def release(state: SetState) -> None:
+    """Assign no pixel again."""
+    for a in range(state.size[0]):
+        release_pixels(state.members[a], state.pixels)
+
+
+@kernel
+def fill_gains(
+    members: Ints, candidates: Ints, problem: DetectionProblem, gains: Floats, view_evidence: Floats, tracks: Ints
+) -> None:
+    """Fill gains (k,) with those of some candidates, int64 (k,), in the set of the members, int64 (n,): nats.
+
+    Of candidates outside it, `view_evidence` float64 (view, k) and `tracks` int64 (k,) are filled, too: what
+    `fill_evidence` says of each.
+    """
+    _fill_gains(members, candidates, set_state(problem), gains, view_evidence, tracks)
+
+
+@kernel
+def _fill_gains(
+    members: Ints, candidates: Ints, whole: SetState, gains: Floats, view_evidence: Floats, tracks: Ints
+) -> None:
+    state = pointed(whole)
+    for i in members:
+        put(i, state.size[0], state)
+    for k in range(len(candidates)):
+        gains[k] = gain(candidates[k], -1, state)
+        if not state.inside[candidates[k]]:
+            tracks[k] = fill_evidence(candidates[k], state, view_evidence[:, k])
+    release(state)
