@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import detector_models
 import numpy as np
@@ -110,6 +111,8 @@ def test_boxes_are_those_of_the_person(detected: Path) -> None:
 @compiled_only
 def test_a_run_makes_the_boxes_that_detect_makes(filmed: Path, detected: Path, tmp_path: Path) -> None:
     assert track(filmed, tmp_path / "one.h5") == 0
+    shutil.copy(tmp_path / "one.h5", tmp_path / "old.h5")
+    assert track(filmed, tmp_path / "old.h5") == 2 and not (tmp_path / "old.h5.boxes").exists()
     assert track(detected, tmp_path / "other.h5") == 0
     assert_same(tmp_path / "one.h5", tmp_path / "other.h5")
     run = read_run(tmp_path / "one.h5")
@@ -123,11 +126,13 @@ def test_a_run_makes_the_boxes_that_detect_makes(filmed: Path, detected: Path, t
 
 @pytest.mark.parametrize("kill", [0, 1, FRAMES - 1, FRAMES + 9, 4 * FRAMES - 1])
 def test_killed_detection_goes_on(
-    kill: int, room: Path, detected: Path, searched: list[int], stdout: Command, tmp_path: Path
+    kill: int, room: Path, detected: Path, searched: list[int], stdout: Command, capsys: Any, tmp_path: Path
 ) -> None:
     searched[1] = kill
     with pytest.raises(Stop):
         stdout("detect", room, "-o", tmp_path / "boxes")
+    kept = f"are kept in {tmp_path / 'boxes'}; the same command goes on from there"
+    assert (kept in capsys.readouterr().err) == (kill >= detected_boxes._PICTURES)
     before, searched[1] = searched[0], -1
     printed = stdout("detect", room, "-o", tmp_path / "boxes")
     assert searched[0] - before <= 4 * FRAMES - kill + 2 * detected_boxes._PICTURES

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -66,11 +67,23 @@ def _detect(recording: Recording, boxes: dict[int, DetectedBoxes], reporter: Rep
         reporter.note(note)
     frames = {k: sum(map(len, streams.times[k])) for k in boxes}
     done = sum(one.state.frames for one in boxes.values())
-    with reporter.progress("detecting", sum(frames.values()), done) as advance:
+    with reporter.progress("detecting", sum(frames.values()), done) as advance, _kept(boxes, reporter):
         for k, one in boxes.items():
             by_stamps = streams.frame_at_tick[k] is not None
             with closing(one.begin(by_stamps)):
                 detect_frames(recording.sources[k].source, recording.rig.cameras[k], one, advance)
+
+
+@contextmanager
+def _kept(boxes: dict[int, DetectedBoxes], reporter: Reporter) -> Iterator[None]:
+    """On an error, note what is kept."""
+    try:
+        yield
+    except BaseException:
+        if frames := sum(one.state.frames for one in boxes.values()):
+            folder = next(iter(boxes.values())).path.parent
+            reporter.note(f"the boxes of {frames} frames are kept in {folder}; the same command goes on from there")
+        raise
 
 
 def _without_detector(feed: CameraSource) -> CameraSource:
