@@ -181,11 +181,24 @@ class StreamIndex:
         return (int(multiple[0]), int(multiple[-1]) + 1) if len(multiple) else (0, self.length)
 
 
+def require_own_sources(recording: Recording) -> None:
+    """Raise SourceError where two cameras have one source; `select` or `view` names a camera's part of a file."""
+    cameras, sources = recording.rig.cameras, [feed.source for feed in recording.sources]
+    for camera, source in zip(cameras, sources, strict=True):
+        other = cameras[sources.index(source)]
+        if other is not camera and not source.address:
+            expected = "a file of its own" + (", or its part by select or view" if source.kind == "boxes" else "")
+            found = f"the source of camera {other.name} too"
+            raise SourceError(source.path, f"camera {camera.name}", found, expected)
+
+
 def index_streams(recording: Recording) -> StreamIndex:
     """Index a recording: its number of frames, their stamps and the alignment of its cameras, by decoding all.
 
-    SourceError, FormatError where a source is missing, empty or not of its kind, or the streams do not end together.
+    SourceError, FormatError where a source is missing, empty or not of its kind, or that of another camera, too, or the
+    streams do not end together.
     """
+    require_own_sources(recording)
     with ExitStack() as opened:
         streams = open_aligned_streams(recording, opened)
         pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.errors import SourceError
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.source_files import source_parts
+from stseg.io.recording.video.avi_index import lost_frames
 from stseg.io.recording.video.time_stamps import (
     TimeStamps,
     concatenate_files,
@@ -35,6 +37,8 @@ _JITTER = 0.5
 whose frames lie midway between ticks would repeat and skip frames at the slightest jitter."""
 _COUNT_TOLERANCE = 0.01
 """Relative difference up to which two frame counts are equal."""
+_RANGES = 5
+"""Number of gaps that a message lists."""
 _END_TOLERANCE = 1.0
 """Cameras aligned by time end together where their ends differ by no more than this, seconds."""
 
@@ -58,6 +62,8 @@ class _CameraTimes:
     has_stamps: bool
     stamps: TimeStamps | None
     counted: Floats
+    damage: str
+    """Frames that its files lost, as a message; empty where they are whole."""
 
     @property
     def regular(self) -> bool:
@@ -95,8 +101,11 @@ def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> Ti
             notes.setdefault(note, []).append(camera.name)
         if trusted is not None:
             frame_at_tick.append(nearest_frames(trusted.position, trusted.period))
+            if len(gaps := _gaps(frame_at_tick[-1])):
+                notes.setdefault(f"no image of frames {_ranges(gaps)}: lost or damaged?", []).append(camera.name)
         else:
-            frame_at_tick.append(nearest_frames(camera.counted, 1.0) if camera.source.source.starts else None)
+            by_place = camera.source.source.starts or camera.damage
+            frame_at_tick.append(nearest_frames(camera.counted, 1.0) if by_place else None)
     lines = tuple(f"{', '.join(names)}: {note}" for note, names in notes.items())
     return TimeAlignment(_with_common_end(recording, cameras, frame_at_tick), lines)
 
@@ -159,15 +168,51 @@ def _camera_times(name: str, source: CameraSource, times: Sequence[Floats], rate
     paths = [part.path for part in source_parts(source.timed, f"camera {name}")]
     require_starts(source.source.starts, len(paths), source.source.path, f"camera {name}, source.starts")
     starts = np.array(source.source.starts, float)
-    counted = concatenate_files([np.arange(float(len(stamps))) for stamps in times], 1.0, rate, paths, starts)
-    return _CameraTimes(name, source, have_stamps(times, paths), interpret_stamps(times, rate, paths, starts), counted)
+    lost = [lost_frames(path, len(stamps)) for path, stamps in zip(paths, times, strict=True)]
+    numbers = [_numbers(len(stamps), gone) for stamps, gone in zip(times, lost, strict=True)]
+    counted = concatenate_files(numbers, 1.0, rate, paths, starts)
+    damage = "; ".join(_damage(path, gone) for path, gone in zip(paths, lost, strict=True) if gone is None or len(gone))
+    stamps = None if damage else interpret_stamps(times, rate, paths, starts)
+    return _CameraTimes(name, source, have_stamps(times, paths), stamps, counted, damage)
+
+
+def _numbers(decoded: int, lost: Ints | None) -> Floats:
+    """Numbers of the frames that were decoded, among all that there were."""
+    if lost is None:
+        return np.arange(float(decoded))
+    return np.delete(np.arange(float(decoded + len(lost))), lost)
+
+
+def _damage(path: Path, lost: Ints | None) -> str:
+    if lost is None:
+        return f"{path.name} is damaged, and its index does not say where: later frames are shown too early"
+    return f"{path.name} is damaged: frames {_ranges(lost)} are lost, and the view is blind there"
+
+
+def _gaps(frame_at_tick: Ints | None) -> Ints:
+    """Ticks between the first and the last frame at which a camera shows none, two or more in a row.
+
+    Single frames are dropped by many cameras now and then.
+    """
+    ticks = np.flatnonzero(np.zeros(0, bool) if frame_at_tick is None else frame_at_tick >= 0)
+    steps = zip(ticks[:-1].tolist(), ticks[1:].tolist(), strict=True)
+    return np.array([tick for a, b in steps if b - a > 2 for tick in range(a + 1, b)], np.int64)
+
+
+def _ranges(numbers: Ints) -> str:
+    """Rising numbers in words: the first ranges of them."""
+    ends = np.flatnonzero(np.diff(numbers) > 1)
+    firsts, lasts = numbers[np.append(0, ends + 1)].tolist(), numbers[np.append(ends, len(numbers) - 1)].tolist()
+    words = [f"{first}" if first == last else f"{first} to {last}" for first, last in zip(firsts, lasts, strict=True)]
+    more = f" and {len(words) - _RANGES} other places" if len(words) > _RANGES else ""
+    return ", ".join(words[:_RANGES]) + more
 
 
 def _trusted_stamps(camera: _CameraTimes, others: Sequence[_CameraTimes], rate: float) -> tuple[TimeStamps | None, str]:
     """The stamps that place a camera's frames, None where frames are counted; and a message for the user."""
     stamps, source = camera.stamps, camera.source
-    if source.clock == "count":
-        return None, ""
+    if camera.damage or source.clock == "count":
+        return None, camera.damage
     if stamps is None:
         if source.clock == "stamps":
             found = "files without time stamps that rise"

@@ -7,7 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from stseg.arrays import Floats
 from stseg.engine.recordings import run_of
+from stseg.errors import FormatError
+from stseg.geometry import Grid
 from stseg.io.areas import read_lines, read_polygons
 from stseg.io.exports.tables import write_tables
 from stseg.io.outputs.whole_files import Inputs, make_folder, write_png
@@ -51,7 +54,7 @@ def measure(
     Raises
     ------
     FormatError
-        Where a file is no GeoJSON of such features.
+        Where a file is no GeoJSON of such features, or one of them lies beside the ground.
     """
     found = run_of(run)
     if output is not None:
@@ -74,7 +77,23 @@ def read_areas(run: Run, zones: Path | str | None, lines: Path | str | None) -> 
     """Zones and lines from files; without a file of zones, the whole ground."""
     named = [] if zones is None else [Zone(name, rings) for name, rings in read_polygons(Path(zones))]
     drawn = [] if lines is None else [Line(name, points) for name, (points,) in read_lines(Path(lines))]
+    grid = run.recording.rig.grid
+    for file, shapes in (
+        (zones, [("zone", zone.name, zone.rings[0]) for zone in named]),
+        (lines, [("line", line.name, line.points) for line in drawn]),
+    ):
+        for noun, name, points in shapes:
+            _require_on_ground(Path(file or ""), f"{noun} {name}", points, grid)
     return Areas(tuple(named) or (_whole(run),), tuple(drawn))
+
+
+def _require_on_ground(file: Path, place: str, points: Floats, grid: Grid) -> None:
+    """Refuse points (n, 2) that lie beside the ground rectangle, all of them on one side."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    if any(high[k] < side[0] or low[k] > side[1] for k, side in enumerate((grid.x, grid.y))):
+        found = f"x {low[0]:g} to {high[0]:g}, y {low[1]:g} to {high[1]:g}"
+        ground = f"x {grid.x[0]:g} to {grid.x[1]:g}, y {grid.y[0]:g} to {grid.y[1]:g}"
+        raise FormatError(file, place, found, f"metres on the ground, which is {ground}")
 
 
 def _whole(run: Run) -> Zone:

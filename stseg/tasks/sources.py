@@ -14,6 +14,7 @@ from stseg.config import BodyConfig
 from stseg.geometry import Camera, Grid
 from stseg.io.detections.source_detections import SourceDetections, read_source
 from stseg.io.outputs.whole_files import Inputs, make_folder, write_png
+from stseg.io.recording.aligned_stream import require_own_sources
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.source_files import is_detection_file, recording_files
@@ -121,6 +122,7 @@ class SourceSummary:
 
 def summarise_sources(recording: Recording) -> list[SourceSummary]:
     """A summary of each camera's source; raises InputError where one cannot be read."""
+    require_own_sources(recording)
     cameras, height = zip(recording.rig.cameras, recording.sources, strict=True), body_height(recording)
     return [SourceSummary(camera, one, recording.rig.grid, _detections(one, camera), height) for camera, one in cameras]
 

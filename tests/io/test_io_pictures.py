@@ -175,10 +175,10 @@ def video(path: Path, codec: str, frames: int = 9) -> Path:
 
 
 def decoded(path: Path) -> Floats:
-    """The times of what really decodes."""
+    """The times of what really decodes, behind pictures that do not, too."""
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     times = []
-    while capture.grab():
+    while any(capture.grab() for _ in range(20)):
         times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
     capture.release()
     return np.array(times, float)

@@ -141,6 +141,15 @@ def test_malformed_geojson_is_named(tmp_path: Path, text: str, message: str) -> 
     refused(FormatError, "found", read_lines, path)
 
 
+def test_areas_beside_the_ground_are_refused(tmp_path: Path) -> None:
+    run, path = write_small_run(tmp_path / "run.h5"), tmp_path / "areas.geojson"
+    path.write_text(json.dumps(feature("Polygon", [[[11.5, 48.1], [11.6, 48.1], [11.6, 48.2]]])))
+    match = r"areas.geojson: zone a: found x 11.5 to 11.6, y 48.1 to 48.2, expected metres on the ground, which is x"
+    refused(FormatError, match, stseg.measure, run, path)
+    path.write_text(json.dumps(feature("LineString", [[-90, 0], [-80, 0]])))
+    refused(FormatError, "line a: found x -90 to -80", stseg.measure, run, None, path)
+
+
 def test_a_ring_needs_not_be_closed(tmp_path: Path) -> None:
     path = tmp_path / "zones.geojson"
     path.write_text(json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 0], [1, 1], [0, 0]]])))

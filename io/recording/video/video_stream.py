@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import cv2
 import numpy as np
 
@@ -10,6 +12,7 @@ from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.recording.pictures import picture_observation, reduced_view
 from stseg.io.recording.recording import Source
+from stseg.io.recording.video.avi_index import lost_frames
 from stseg.io.recording.video.ffmpeg import open_video
 from stseg.io.recording.video.packets import (
     PictureHeads,
@@ -21,6 +24,8 @@ from stseg.io.recording.video.packets import (
 
 _SEQUENTIAL_FRAMES = 250
 """Frames that are decoded sequentially rather than skipped by seeking."""
+_ATTEMPTS = 500
+"""Failures in a row that end a video: a damaged packet fails, and those after it need not."""
 _SEEK_MARGIN = 4
 """Frames before the target at which seeking aims: seeking is inexact, and the landing frame is known by its stamp."""
 
@@ -111,10 +116,20 @@ class VideoStream:
 
     def _go_to(self, frame: int) -> None:
         """Go to a later frame, or to the last."""
-        if self._times is not None and frame - self._frame > _SEQUENTIAL_FRAMES:
+        if self._times is not None and frame - self._frame > _SEQUENTIAL_FRAMES and self._is_whole:
             self._seek(frame, self._times)
         while self._frame < frame and self._advance():
             pass
+
+    @cached_property
+    def _is_whole(self) -> bool:
+        """Whether no frame is lost: of a damaged AVI seeking and counting find different frames."""
+        lost = lost_frames(self._source.path, 0 if self._times is None else len(self._times))
+        return lost is not None and not len(lost)
+
+    def _grab(self) -> bool:
+        """Go to the next packet that decodes."""
+        return any(self._capture.grab() for _ in range(_ATTEMPTS))
 
     def _seek(self, frame: int, times: Floats) -> None:
         """Go to a frame at or shortly before this one; to the beginning where the landing frame is ambiguous."""
@@ -128,10 +143,10 @@ class VideoStream:
         self._open()
 
     def _advance(self) -> bool:
-        self._ended = self._ended or not self._capture.grab()
+        self._ended = self._ended or not self._grab()
         if self._by_packets and not self._ended and not self._keep_packet():
             self._decode_from(self._frame)  # whether this packet is a frame is for FFmpeg to say
-            self._ended = not self._capture.grab()
+            self._ended = not self._grab()
         if self._ended and self._frame < 0:
             raise self._error("no frame that decodes", "a video that FFmpeg decodes")
         self._frame += not self._ended
