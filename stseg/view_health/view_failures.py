@@ -8,12 +8,12 @@ it that is foreground, the mean over people, and the share c of all the rest, it
 1 for a view without errors, and 0 for one that shows nothing, everything or noise. A measurement counts for
 the time of a frame and person, and is forgotten slowly for the usual J of the view, and quickly for its J now: over
 each of several spans. A view begins to fail when its J of one span is less than 0.7 of the usual one, and that is no
-chance: the difference is more than four of its standard deviations. The deviation is what the means over as many
+chance: the difference is more than 4.6 of its standard deviations. The deviation is what the means over as many
 measurements have shown while the view was sound, so a detector that misses people in single frames excludes no view.
 A low J and its deviations count in the usual ones as soon as it has come back without a failure.
 A failing view is excluded until J of the shortest span has come back. The usual J and the deviation stand while it
 fails. The usual J counts in J now where few people were measured of late, so a view without people comes back by
-itself. A view of which each measurement deviates by s is found to show nothing after about (4 s / J)^2 measurements.
+itself. A view of which each measurement deviates by s is found to show nothing after about (5 s / J)^2 measurements.
 
 A view that never showed more, since its calibration is wrong, has no better past to be measured by. Where its usual J
 is less than 0.7 of the median usual J of four other sound views or more, that median is expected of it; among fewer it
@@ -46,8 +46,8 @@ _FAILURE_SHARE = 0.7
 """Share of its usual informedness below which a view fails."""
 _SPANS, _SPAN_FRAMES = (0.25, 1.0, 4.0), (3.0, 1.0, 1.0)
 """Time constants of the informedness now, seconds, and frames at least: the shortest says when a view is back."""
-_SIGNIFICANCE = 4.0
-"""Least deviation of a failing view from its usual informedness, standard deviations: one in 30,000 by chance."""
+_SIGNIFICANCE = 4.6
+"""Least deviation of a failing view from its usual informedness, standard deviations: two in a million by chance."""
 _VARIANCE, _VARIANCE_TIME = 0.2, 5.0
 """Variance of a measurement before the recording, and the time for which it counts, seconds."""
 _MEASURED = 0.5
