@@ -180,11 +180,13 @@ def resumable(folder: WorkFolder, reporter: Reporter) -> Iterator[None]:
     """On an error, keep the work folder and note it where it holds segments; else remove it."""
     try:
         yield
-    except BaseException:
+    except BaseException as error:
         if number := len(folder.segments()):
             reporter.note(f"{number} finished segments are kept in {folder.path}; the same command goes on from there")
         else:
             folder.remove()
+            if isinstance(error, KeyboardInterrupt):
+                reporter.note("no segment of the recording was finished: nothing is kept")
         raise
 
 
