@@ -13,6 +13,7 @@ import re
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -23,13 +24,19 @@ from typing import Self
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
+from stseg.kernels.checked_files import CheckedFiles, is_private
+
 if sys.platform != "win32":
     import fcntl
 
 _PACKAGE = Path(__file__).parents[1]
 _IMPORT = re.compile(rb"^from (stseg[\w.]*) import |^import (stseg[\w.]*)", re.MULTILINE)
 _IMPORT_OF_KERNELS = b"from stseg.kernels.accelerate import"
-_COMPILING_FILES = tuple(_PACKAGE / "kernels" / name for name in ("accelerate.py", "cache.py", "fast_compile.py"))
+_COMPILING_FILES = tuple(
+    _PACKAGE / "kernels" / name for name in ("accelerate.py", "cache.py", "checked_files.py", "fast_compile.py")
+)
+_PATIENCE, _PAUSE = 60.0, 0.02
+"""Seconds for which another process that compiles kernels of the same file is waited for, and between two tries."""
 
 
 class KernelFolder:
@@ -49,8 +56,9 @@ class KernelFolder:
             return None
 
     def ensure_cache_path(self) -> None:
-        """Make the folder."""
-        self._path.mkdir(parents=True, exist_ok=True)
+        """Make the folder, where there is room."""
+        with suppress(OSError):
+            self._path.mkdir(parents=True, exist_ok=True)
 
     def get_cache_path(self) -> str:
         """The folder of the kernel's files."""
@@ -76,17 +84,23 @@ class KernelCache(FunctionCache):
 
     _impl_class = KernelFiles
 
+    def __init__(self, function: Callable[..., object]) -> None:
+        super().__init__(function)
+        self._cache_file = CheckedFiles(
+            self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
+        )
+
 
 @contextmanager
 def locked(place: str) -> Iterator[None]:
-    """Hold the lock of a folder within the body, where the system and its file system have such locks."""
+    """Hold the lock of a folder within the body, where systems have such locks; after a minute go on without it."""
     if sys.platform == "win32":
         yield
         return
     opened = None
     with suppress(OSError):
         opened = os.open(place, os.O_RDONLY)
-        fcntl.flock(opened, fcntl.LOCK_EX)
+        _lock(opened)
     try:
         yield
     finally:
@@ -94,11 +108,21 @@ def locked(place: str) -> Iterator[None]:
             os.close(opened)
 
 
+def _lock(opened: int) -> None:
+    """Lock an open folder; a process that was stopped, or that is not ours, is not waited for without end."""
+    for _ in range(round(_PATIENCE / _PAUSE)):
+        try:
+            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            time.sleep(_PAUSE)
+
+
 @cache
 def folder() -> Path:
-    """The folder of all kernels: the first that can be written to; else one of this process alone."""
+    """The folder of all kernels: the first that is this user's and can be written to; else one of this process."""
     for place in (_folder_of_environment(), _folder_of_user()):
-        if place is not None and _is_writable(place):
+        if place is not None and _is_usable(place):
             return place
     temporary = Path(tempfile.mkdtemp(prefix="stseg-kernels-"))
     atexit.register(shutil.rmtree, temporary, ignore_errors=True)
@@ -155,10 +179,13 @@ def _folder_of_user() -> Path | None:
     return Path(base) / "stseg" / "kernels"
 
 
-def _is_writable(place: Path) -> bool:
+def _is_usable(place: Path) -> bool:
+    """Whether a folder is this user's alone and has room; others lose the right to write to one of this user's."""
     try:
-        place.mkdir(parents=True, exist_ok=True)
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if os.name == "posix" and place.stat().st_uid == os.geteuid():
+            place.chmod(0o700)
         with tempfile.TemporaryFile(dir=place):
-            return True
+            return is_private(place.stat())
     except OSError:
         return False

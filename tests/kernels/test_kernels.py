@@ -1,6 +1,11 @@
 """Kernels: compiled with all that they call, kept in the cache, with named tuples passed by address."""
 
+import os
+import pickle
+import shutil
+import stat
 import sys
+from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +16,7 @@ from refusals import refused
 
 from stseg.arrays import Floats, Ints
 from stseg.kernels.accelerate import FAST, kernel, python_form
+from stseg.kernels.cache import folder, locked
 from stseg.kernels.pointed_tuples import pointed
 
 PROGRAM = """
@@ -90,6 +96,82 @@ def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
     assert sorted(len(lines) for lines in printed) == [2, 3]
     assert sum("compiling" in lines[0] for lines in printed) == 1
     assert [lines[-2] for lines in printed] == ["4.9 1 0", "4.9 1 0"]
+
+
+@pytest.fixture(scope="module")
+def cached(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that holds the kernels of the program."""
+    path = tmp_path_factory.mktemp("cached")
+    process(PROGRAM, NUMBA_CACHE_DIR=str(path))
+    return path
+
+
+class Payload:
+    """Makes a file where it is unpickled."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return open, ("executed", "w")
+
+
+def damaged(file: Path, kind: str) -> None:
+    content = file.read_bytes()
+    if kind == "empty":
+        file.write_bytes(b"")
+    elif kind == "flipped":
+        file.write_bytes(content[:-200] + bytes([content[-200] ^ 1]) + content[-199:])
+    elif kind == "forged":
+        file.write_bytes(pickle.dumps(Payload()) + content)
+    elif kind == "writable":
+        file.write_bytes(blake2b(forged := pickle.dumps(Payload())).digest() + forged)
+        file.chmod(0o666)
+    else:
+        os.chown(file, 12345, -1)
+
+
+@COMPILED
+@pytest.mark.skipif(sys.platform == "win32", reason="no owners and modes of files")
+@pytest.mark.parametrize(
+    ("kind", "files"),
+    [("empty", "nbi"), ("empty", "nbc"), ("flipped", "nbc"), ("forged", "nbi"), ("writable", "nbi"), ("owned", "nbc")],
+)
+def test_files_of_the_cache_are_used_as_this_user_wrote_them(
+    cached: Path, tmp_path: Path, kind: str, files: str
+) -> None:
+    if kind == "owned" and os.geteuid():
+        pytest.skip("only root gives files away")
+    shutil.copytree(cached, tmp_path, dirs_exist_ok=True)
+    for file in tmp_path.rglob(f"*.{files}"):
+        damaged(file, kind)
+    anew, known = (process(PROGRAM, cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
+    assert anew.stdout.splitlines()[1:] == ["4.9 1 0", "True"] and not anew.stderr
+    assert known.stdout.splitlines() == ["4.9 1 0", "False"] and not known.stderr
+    assert not (tmp_path / "executed").exists()
+
+
+@COMPILED
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of a file's length")
+def test_kernels_need_no_room_on_the_disk(tmp_path: Path) -> None:
+    full = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n{PROGRAM}"
+    ended = process(full, NUMBA_CACHE_DIR=str(tmp_path), PYTHONDONTWRITEBYTECODE="1")
+    assert ended.stdout.splitlines()[1:] == ["4.9 1 0", "True"] and not ended.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks of folders")
+def test_a_lock_of_others_is_not_waited_for_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stseg.kernels.cache._PATIENCE", 0.1)
+    with locked(str(tmp_path)), locked(str(tmp_path)):
+        pass
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no owners and modes of files")
+def test_the_folder_of_kernels_is_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    (tmp_path / "stseg").mkdir()
+    (tmp_path / "stseg").chmod(0o777)
+    assert folder.__wrapped__() == tmp_path / "stseg"
+    assert stat.S_IMODE((tmp_path / "stseg").stat().st_mode) == 0o700
+    monkeypatch.setattr(os, "geteuid", lambda: 12345)
+    assert tmp_path not in folder.__wrapped__().parents
 
 
 class Walk(NamedTuple):
