@@ -289,7 +289,7 @@ def test_a_run_is_solved_again(undisturbed: Path, tmp_path: Path) -> None:
     assert len(run.committed) >= len(run.trajectory) - 5
     same = solved(undisturbed, tmp_path / "same.h5", "keep,20,1,,")
     for name in ("trajectory", "tracks", "boxes"):
-        np.testing.assert_array_equal(getattr(same, name), getattr(run, name))
+        assert getattr(same, name).tobytes() == getattr(run, name).tobytes()
     new = solved(undisturbed, tmp_path / "new.h5", "swap,20,1,2,", "name,,2,,Bo", "delete,,3,,")
     assert set(new.tracks["id"].tolist()) == {1, 2}
     assert new.names == {2: "Bo"}

@@ -328,7 +328,7 @@ class TestCommand:
             ("--source-kind=boxes --score=30", ConfigError, r"--score: found 30.0, expected a number of 0..1"),
             ("--appearance={name}.npy", ConfigError, r"--appearance: found --source-kind video"),
             ("--cell=0", RigError, r"grid.cell: found 0.0"),
-            ("--up=y", CycloptsError, r"--up"),
+            ("--up=w", CycloptsError, r"--up"),
         ],
     )
     def test_says_what_to_mend(
