@@ -25,7 +25,7 @@ from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.identities.association import NO_KNOWN_PEOPLE
 from stseg.io.config_file import format_config
-from stseg.io.outputs.whole_files import Inputs, require_output
+from stseg.io.outputs.whole_files import Inputs
 from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.source_files import recording_files
@@ -153,8 +153,8 @@ def track_recording(
     config = with_body_of(recording, config)
     if workforce.scheduler is None:
         require_memory(recording.rig, config, recording.path)
-    if not output.with_name(f"{output.name}.segments").exists():  # refused before people are searched in videos
-        require_output(output, overwrite, Inputs(recording_files(recording), [known]))
+    # Refused before people are searched in videos.
+    WorkFolder(output, {}).require_output(overwrite, Inputs(recording_files(recording), [known]))
     recording = with_boxes(recording, output.with_name(f"{output.name}.boxes"), reporter, overwrite)
     people = NO_KNOWN_PEOPLE if known is None else read_known(known, config)
     request = run_request(recording, gather_provenance(recording, format_config(config)))
