@@ -13,7 +13,7 @@ from stseg.config import Config
 from stseg.config.keys import require_effect
 from stseg.engine.memory import require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
-from stseg.engine.offline.detected_boxes import with_boxes
+from stseg.engine.offline.detector_sources import with_boxes
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.known import digest, read_known

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from stseg.engine.offline.detected_boxes import with_boxes
+from stseg.engine.offline.detector_sources import with_boxes
 from stseg.engine.recordings import recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import SourceError

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -12,7 +11,7 @@ from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.io.outputs.whole_files import Inputs
 from stseg.io.runfile.runs import Run
 from stseg.reporting.figures import ground_figures
-from stseg.reporting.page.html import png_bytes
+from stseg.reporting.page.html import data_uri, png_bytes
 from stseg.tasks.report import film, require_outputs
 
 
@@ -38,8 +37,7 @@ class FilmFile:
     """The MP4 file."""
 
     def _repr_html_(self) -> str:
-        data = base64.b64encode(self.path.read_bytes()).decode("ascii")
-        return f'<video controls width="960" src="data:video/mp4;base64,{data}"></video>'
+        return f'<video controls width="960" src="{data_uri("video/mp4", self.path.read_bytes())}"></video>'
 
 
 def plan_picture(run: Run) -> PlanPicture:
@@ -50,8 +48,8 @@ def plan_picture(run: Run) -> PlanPicture:
 
 def summary_html(run: Run) -> str:
     """A line about a run, and its plan."""
-    data = base64.b64encode(png_bytes(plan_picture(run).pixels)).decode("ascii")
-    return f'<p>{escape(repr(run))}</p><img width="450" src="data:image/png;base64,{data}">'
+    picture = data_uri("image/png", png_bytes(plan_picture(run).pixels))
+    return f'<p>{escape(repr(run))}</p><img width="450" src="{picture}">'
 
 
 def write_film(

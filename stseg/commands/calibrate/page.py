@@ -23,6 +23,7 @@ from stseg.reporting.page.calibration_page import FloorPlan, calibration_page
 from stseg.tasks.calibration.automatic import camera_names, uncalibrated_camera
 
 _DEFAULT_FRAMES = (0, 50, 100, 200, 400, 800)
+"""Frames that the slider chooses among where none is given: the later ones exist in long videos alone."""
 
 
 def calibrate_page(
@@ -92,13 +93,15 @@ def _frames(path: Path, chosen: tuple[int, ...]) -> list[Bytes]:
 
 
 def _next_command(videos: Sequence[Path], frames: Sequence[Bytes], area: str) -> str:
-    """The command that makes a rig of the points, by the names in the page."""
+    """The command that makes a rig of the points; in words where views differ in size, as it takes one."""
     sizes = {(frame.shape[1], frame.shape[0]) for frame in frames}
-    width, height = max(sizes)
+    if len(sizes) > 1:
+        return "the views differ in size: stseg calibrate points takes points of one size at a time (--size)"
+    ((width, height),) = sizes
     films = [path for path in videos if not is_image_source(path)]
     rate = read_frame_rate(films[0]) if films else None
     frame_rate = "FRAMES_PER_SECOND" if rate is None else f"{rate:.6g}"
-    scene = f"--size {width},{height} --area={area} --frame-rate {frame_rate}"
+    scene = f"--size {width},{height} {quote(f'--area={area}')} --frame-rate {frame_rate}"
     streams = f"--sources {quote(','.join(map(str, videos)))}{'' if films else ' --source-kind images'}"
     return f"stseg calibrate points points.csv -o rig.toml {scene} {streams}"
 

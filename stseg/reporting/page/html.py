@@ -169,7 +169,7 @@ def figures(pictures: Sequence[Figure], layout: str) -> str:
 def figure(picture: Figure) -> str:
     """A picture with its caption: PNG, but JPEG of photographs, that a page with many cameras stays light."""
     data = png_bytes(picture.picture)
-    source = jpeg_uri(picture.picture, 85) if len(data) > _MAX_PNG else _uri("png", data)
+    source = jpeg_uri(picture.picture, 85) if len(data) > _MAX_PNG else data_uri("image/png", data)
     tall, wide = picture.picture.shape[:2]
     words = escape(picture.caption)
     return (
@@ -181,11 +181,12 @@ def figure(picture: Figure) -> str:
 def jpeg_uri(picture: Bytes, quality: int) -> str:
     """A picture as the address of a JPEG inside the page; `quality` is 1..100."""
     _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return _uri("jpeg", bytes(np.asarray(data, np.uint8)))
+    return data_uri("image/jpeg", bytes(np.asarray(data, np.uint8)))
 
 
-def _uri(kind: str, data: bytes) -> str:
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
+def data_uri(kind: str, data: bytes) -> str:
+    """Data of a kind such as image/png as an address inside a page."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def chart(svg: str, caption: str) -> str:
