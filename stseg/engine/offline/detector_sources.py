@@ -42,8 +42,7 @@ def with_boxes(recording: Recording, folder: Path, reporter: Reporter, overwrite
     boxes = {k: _boxes(recording, k, source, folder, overwrite) for k, source in sources.items()}
     missing = [k for k, one in boxes.items() if not one.state.whole]
     if missing:
-        make_folder(folder)
-        _detect(recording, {k: boxes[k] for k in missing}, reporter)
+        _detect(recording, {k: boxes[k] for k in missing}, folder, reporter)
     feeds = [_with_boxes(feed, boxes[k]) if k in boxes else feed for k, feed in enumerate(recording.sources)]
     return replace(recording, sources=tuple(feeds))
 
@@ -57,10 +56,11 @@ def _boxes(recording: Recording, k: int, source: Source, folder: Path, overwrite
     return DetectedBoxes(folder, recording.rig.cameras[k].name, request, overwrite)
 
 
-def _detect(recording: Recording, boxes: dict[int, DetectedBoxes], reporter: Reporter) -> None:
+def _detect(recording: Recording, boxes: dict[int, DetectedBoxes], folder: Path, reporter: Reporter) -> None:
     """Search the videos of the cameras whose boxes are not whole."""
     for k in boxes:
-        make_detector(recording.sources[k].source)  # refused before hours of work
+        make_detector(recording.sources[k].source)  # refused before hours of work, and before anything is written
+    make_folder(folder)
     with reporter.progress("counting", None):
         streams = index_streams(replace(recording, sources=tuple(map(_without_detector, recording.sources))))
     for note in streams.notes:
