@@ -17,13 +17,13 @@ settings.register_profile("timeless", deadline=None, suppress_health_check=[Heal
 settings.load_profile("timeless")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The rig file of a small recording."""
     return write_recording(tmp_path_factory.mktemp("recording"))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def undisturbed(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its run file, made by one process without a break; nothing else is in its folder."""
     path = tmp_path_factory.mktemp("undisturbed") / "run.h5"

@@ -289,10 +289,10 @@ def film(path: Path, endpoints: Endpoints, frames: int) -> None:
 
 
 def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    scene = walking(2, 2, 40.0)
+    scene = walking(2, 2, 20.0)
     videos = [tmp_path / "a.avi", tmp_path / "b.avi"]
     for video, endpoints in zip(videos, scene.views.endpoints, strict=True):
-        film(video, endpoints, 200)
+        film(video, endpoints, 100)
     output = tmp_path / "rig.toml"
     distance = ("a,150,250,300,260,3",)
     calibrate_auto(*videos, output=output, frame_rate=5.0, source_kind="masks", most_delay=0.0, distance=distance)

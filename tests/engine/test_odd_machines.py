@@ -157,17 +157,15 @@ def test_parts_of_a_later_clock_are_removed(tmp_path: Path) -> None:
     assert [part.exists() for part in parts] == [False, True, False]
 
 
-def test_a_clock_set_back_before_a_resume_changes_nothing(tmp_path: Path) -> None:
-    (tmp_path / "whole").mkdir()
-    rig, night = write_recording(tmp_path), tmp_path / "night.h5"
-    assert track(rig, tmp_path / "whole" / "run.h5") == 0
-    with started(COMMAND, *run_words(rig, night)) as running:
+def test_a_clock_set_back_before_a_resume_changes_nothing(rig_path: Path, undisturbed: Path, tmp_path: Path) -> None:
+    night = tmp_path / "night.h5"
+    with started(COMMAND, *run_words(rig_path, night)) as running:
         while running.poll() is None and not list(tmp_path.glob("night.h5.segments/segment-*-*.h5")):
             time.sleep(0.01)
         running.kill()
     assert not night.exists()
     for path in tmp_path.glob("night.h5.segments/*"):
         os.utime(path, (time.time() + YEAR,) * 2)
-    assert track(rig, night) == 0
-    assert_same(night, tmp_path / "whole" / "run.h5")
+    assert track(rig_path, night) == 0
+    assert_same(night, undisturbed)
     assert not list(tmp_path.glob("night.h5.*"))

@@ -31,7 +31,7 @@ SLOW_DISK = """
 import time
 from stseg.engine.offline.segment_writer import SegmentWriter
 keep = SegmentWriter.keep
-SegmentWriter.keep = lambda writer: (time.sleep(0.5), keep(writer))[1]
+SegmentWriter.keep = lambda writer: (time.sleep(0.2), keep(writer))[1]
 """
 """What makes the disk of a run slow, that it is still at work when a signal reaches it on a machine of any speed."""
 pytestmark = compiled_only

@@ -13,8 +13,9 @@ from dataclasses import replace
 from multiprocessing import active_children
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import distributed
 import pytest
 from recordings import ENVIRONMENT, assert_same, compiled_only, run_words, track, write_recording
 from refusals import Command
@@ -136,9 +137,13 @@ def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
     assert_same(output, undisturbed)
 
 
-def test_a_scheduler_that_is_not_there(rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert track(rig_path, tmp_path / "run.h5", "--scheduler", "tcp://127.0.0.1:9") == 2
-    assert "no scheduler at tcp://127.0.0.1:9" in capsys.readouterr().err
+def test_a_scheduler_that_is_not_there(
+    rig_path: Path, tmp_path: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client: Any = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=timeout and "0.5s"))
+    words = run_words(rig_path, tmp_path / "run.h5", "--scheduler", "tcp://127.0.0.1:9")
+    assert "no scheduler at tcp://127.0.0.1:9" in refusal(*words)
 
 
 @pytest.fixture(autouse=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from recordings import compiled_only
+from recordings import compiled_only, track
 from reference_geometry import project_by_matrix, project_by_opencv
 from scenes import looking
 from strategies import BARREL, Pose, cameras, grids, numbers, poses, rigs
@@ -310,7 +310,7 @@ def test_boxes_of_a_run_are_in_the_pixels_of_the_images(tmp_path: Path) -> None:
     assert min(factors) > 1
     boxes = []
     for name, asked in (("whole.h5", 10000.0), ("reduced.h5", rows)):
-        assert main(["run", str(rig), "-o", str(tmp_path / name), "--set", f"foreground.body_rows={asked}"]) == 0
+        assert track(rig, tmp_path / name, options=("--set", f"foreground.body_rows={asked}")) == 0
         boxes.append(read_run(tmp_path / name).boxes)
     whole, reduced = boxes
     last = [table[table["frame"] == table["frame"].max()] for table in boxes]

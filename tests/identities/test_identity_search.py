@@ -51,7 +51,7 @@ def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "_ALTERNATIVE_LOSS", 1e5)
         patch.setattr(search, "_BEAM_LOSS", 1e5)
-        seen = seen_of(rows[:7])
+        seen = seen_of(rows[:6])
         names = found(seen, hypotheses=5000).tolist()
     best = greatest_score(seen, MODEL.spread, CONFIG.motion, LONGEST) if len(rows) else 0.0
     assert score(seen, names, MODEL.spread, CONFIG.motion, LONGEST) == pytest.approx(best, abs=1e-6)

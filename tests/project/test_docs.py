@@ -3,6 +3,7 @@
 import ast
 import re
 import shlex
+import shutil
 import sys
 import tomllib
 from importlib.util import find_spec
@@ -10,7 +11,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
-from recordings import compiled_only, track, write_recording
+from recordings import compiled_only
 
 from stseg.commands.main import COMMANDS, _app
 from stseg.config import Config
@@ -205,10 +206,11 @@ def commands(page: Path) -> list[list[str]]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(rig_path: Path, undisturbed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording and its run under the names that pages give them."""
     place = tmp_path_factory.mktemp("docs")
-    assert track(write_recording(place), place / "run.h5") == 0
+    shutil.copytree(rig_path.parent, place, dirs_exist_ok=True)
+    shutil.copy(undisturbed, place)
     (place / "RUN.h5").symlink_to(place / "run.h5")
     return place
 

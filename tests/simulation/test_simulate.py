@@ -242,14 +242,14 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
 
 
 def test_regulars_come_back_as_they_were() -> None:
-    spec = NAMED["return"]
+    spec = replace(NAMED["return"], seconds=NAMED["return"].seconds / 2)
     came, heights, before = Counter[int](), set[tuple[int, float]](), set[int]()
     for crowd in walk_freely(spec):
         heights.update(zip(crowd.id.tolist(), crowd.height.tolist(), strict=True))
         came.update(set(crowd.id.tolist()) - before)
         before = set(crowd.id.tolist())
     assert set(came) == set(range(1, spec.people + 1))
-    assert min(came.values()) >= 6
+    assert min(came.values()) >= 3
     assert len(heights) == spec.people
 
 

@@ -119,10 +119,10 @@ def test_a_detector_that_misses_boxes_excludes_no_view(missed: float) -> None:
     (asked, learned), rng, excluded = session("boxes"), np.random.default_rng(6), 0
     standing = STANDING[:2]
     seen = [view for view in shown("boxes", standing) if isinstance(view, Boxes)]
-    for _ in range(300):
+    for _ in range(150):
         explained(asked, learned, [view.of(rng.random(len(view)) >= missed) for view in seen], 1)
         excluded += int(learned.failures.failing.sum())
-    assert excluded <= 0.01 * 300 * len(seen)
+    assert excluded <= 0.01 * 150 * len(seen)
     explained(asked, learned, failed("boxes", "black", seen), 12)
     assert learned.failures.failing.tolist() == [k == FAILED for k in range(4)]
 
