@@ -144,10 +144,10 @@ def scales_by_definition(detector: Detector, observations: list[ViewObservation]
     cells = len(detector.lattice_ground.reshape(-1, 2))
     mean = np.zeros((len(views), cells))
     inside: list[Flags] = []
-    common = [slice(3 * k * cells + 1, 3 * (k + 1) * cells, 3) for k in range(len(views))]
+    common = [slice((3 * k + 1) * cells, (3 * k + 2) * cells) for k in range(len(views))]
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
         first, area = lattice.first[common[k]], lattice.area[common[k]]
-        spans = [lattice.spans[slice(*lattice.start[i : i + 2])] for i in range(common[k].start, common[k].stop, 3)]
+        spans = [lattice.spans[slice(*lattice.start[i : i + 2])] for i in range(common[k].start, common[k].stop)]
         inside_cell = np.zeros((cells, *view.shape), bool)
         for cell in range(cells):
             for row, (left, right) in enumerate(spans[cell]):

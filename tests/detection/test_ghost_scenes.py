@@ -222,7 +222,7 @@ def by_definition(rasters: Singles, owner: Shorts, before: float) -> Floats:
             spans = outlines.spans[outlines.start[i] : outlines.start[i + 1]]
             total = sum(is_shown[outlines.first[i] + k, a:b].sum() for k, (a, b) in enumerate(spans.tolist()))
             mean[view, pillar] = total / outlines.area[i] if len(spans) else 0.0
-    return np.asarray(before + WEIGHT * mean.sum(0).reshape(CELLS, 3).T)
+    return np.asarray(before + WEIGHT * mean.sum(0).reshape(3, CELLS))
 
 
 def scores(rasters: Singles, owner: Shorts, minimum_probe_score: float, before: float = SCORE_BEFORE) -> Floats:

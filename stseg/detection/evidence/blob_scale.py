@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Floats, Singles
+from stseg.arrays import Floats, Ints, Singles
 from stseg.config import BodyConfig, DetectionConfig
-from stseg.detection.evidence.pillar_evidence import add_pillar_evidence, fill_around
+from stseg.detection.evidence.pillar_evidence import fill_scores, pillar_evidence
 from stseg.detection.evidence.pixel_lattice import PixelLattice
-from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels
-from stseg.kernels.accelerate import kernel
+from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels, unsigned
+from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.pointed_tuples import pointed
 
 
@@ -28,53 +28,34 @@ def blob_scales(
     `rasters` float32 (view, v, u) are log-odds of the views that deliver pixels, zero where a view is blind, nats;
     `extremes` float64 (view, 2) the lowest and the highest of them; `lattice` holds the pillars of bodies.
     """
-    scale, owner = np.empty(rasters.shape, np.float32), lattice.owner.reshape(-1)
+    scale, owner, middle = np.zeros(rasters.shape, np.float32), lattice.owner.reshape(-1), len(body.heights) // 2
+    pixels = UnexplainedPixels.of(rasters, owner, lattice, extremes)
+    score = np.full((len(body.heights), lattice.boxes.shape[1]), config.prior_log_odds)
+    fill_scores(pixels, lattice, np.array([middle]), np.zeros(0, np.int64), 0.0, config.effective_observations, score)
     certain = float(np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate))
-    _fill_scales(
-        UnexplainedPixels.of(rasters, owner, lattice, extremes), lattice, len(body.heights),
-        config.effective_observations, config.prior_log_odds, certain, scale,
-    )  # fmt: skip
+    _fill_scales(pixels, lattice, np.flatnonzero(score[middle] > 0), middle, len(score), certain, scale)
     return scale
 
 
 @kernel
 def _fill_scales(
-    every_pixel: UnexplainedPixels,
-    every_pillar: PixelLattice,
-    heights: int,
-    weight: float,
-    prior: float,
-    certain: float,
+    every_pixel: UnexplainedPixels, every_pillar: PixelLattice, cells: Ints, height: int, heights: int, certain: float,
     scale: Singles,
-) -> None:
-    """Fill scale (view, v, u) inside common bodies that are worth a person with what each explains, 0 elsewhere."""
+) -> None:  # fmt: skip
+    """Raise scale (view, v, u), 0 before, inside the bodies of a height in some cells to what each explains."""
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
-    views = len(every_pillar.shapes)
-    for view in range(views):
-        for row in range(every_pillar.shapes[view, 0]):
-            line = scale[view, row, : every_pillar.shapes[view, 1]]
-            for u in range(len(line)):
-                line[u] = 0.0
-    (more, parts), pillars = np.empty((2, views)), len(every_pillar.outlines.first) // max(views, 1)
-    cells = pillars // heights
-    for cell in range(cells):
-        pillar = cell * heights + heights // 2
-        fill_around(cell, pixels, lattice, more)
-        if add_pillar_evidence(prior, 0.0, pillar, cell, pillars, pixels, lattice, weight, more, parts) > -np.inf:
-            total = 0.0
-            for view in range(views):
-                total += parts[view] / weight
-            for view in range(views if prior + weight * total > 0 else 0):
-                _raise_inside(view, view * pillars + pillar, parts[view] / weight, certain, lattice, scale)
+    for view in range(len(every_pillar.shapes)):
+        for cell in cells:
+            i = (view * heights + height) * every_pillar.boxes.shape[1] + cell
+            mean = pillar_evidence(view, cell, i, pixels, lattice, 1.0)
+            _raise_inside(view, i, np.float32(lattice.outlines.area[i] * mean / certain), lattice, scale)
 
 
-@kernel
-def _raise_inside(view: int, i: int, mean: float, certain: float, lattice: PixelLattice, scale: Singles) -> None:
-    """Raise scale (view, v, u) inside the i-th pillar of all to the pixels that it explains."""
-    outlines = lattice.outlines
-    value, row = np.float32(outlines.area[i] * mean / certain), outlines.first[i]
-    for k in range(outlines.start[i], outlines.start[i + 1]):
-        line = scale[view, row, outlines.spans[k, 0] : outlines.spans[k, 1]]
-        for u in range(len(line)):
-            line[u] = value if value > line[u] else line[u]
-        row += 1
+@part
+def _raise_inside(view: int, i: int, value: np.float32, lattice: PixelLattice, scale: Singles) -> None:
+    """Raise scale (view, v, u) to a value inside the i-th pillar of all."""
+    at, row, spans = np.uint64(view), np.uint64(lattice.outlines.first[i]), lattice.outlines.spans
+    for k in range(np.uint64(lattice.outlines.start[i]), np.uint64(lattice.outlines.start[i + 1])):
+        for u in range(unsigned(spans[k, 0]), unsigned(spans[k, 1])):
+            scale[at, row, u] = max(scale[at, row, u], value)
+        row += np.uint64(1)

@@ -24,7 +24,7 @@ class PixelLattice(NamedTuple):
     """Pillars of the birth lattice in all views of a rig that deliver pixels."""
 
     outlines: PackedOutlines
-    """The pillars (view * cell * height,), which are asked for cell by cell; areas are fair ones."""
+    """The pillars (view * height * cell,): most are asked for at one height; areas are fair ones."""
     boxes: Shorts
     """int16 (view, cell, 4): left, top, right, bottom of the box around the outlines of all heights, raster pixels."""
     strips: Shorts
@@ -58,11 +58,11 @@ class PixelLattice(NamedTuple):
         above, gain_above = np.empty((2, len(chosen), rows + 1, columns + 1), np.int32)
         owner = np.full((len(chosen), rows * columns), -1, np.int16)
         left_of = np.empty((len(chosen), rows, columns + 1))
-        per_cell = (len(chosen), len(lattice_ground), len(body.heights))
+        per_cell = (len(chosen), len(body.heights), len(lattice_ground))
         pixel_share = np.where(outlines.inside > 0, 1 / np.maximum(outlines.area, 1), 0.0)
-        inside_share = (outlines.inside * pixel_share).reshape(per_cell).min(2)
+        inside_share = (outlines.inside * pixel_share).reshape(per_cell).min(1)
         return cls(
-            outlines, boxes, strips, inside_share, pixel_share.reshape(per_cell).max(2), shapes, owner, above,
+            outlines, boxes, strips, inside_share, pixel_share.reshape(per_cell).max(1), shapes, owner, above,
             gain_above, left_of,
         )  # fmt: skip
 
@@ -71,8 +71,8 @@ def _drawn(
     views: Sequence[PixelView], lattice_ground: Floats, body: BodyConfig
 ) -> Iterator[tuple[Ints, Spans, Floats]]:
     """Outlines of all pillars, one view after the other."""
-    heights = np.tile(np.asarray(body.heights), len(lattice_ground))
-    places, widths = np.repeat(lattice_ground, len(body.heights), 0), body.width_of(heights)
+    heights = np.repeat(body.heights, len(lattice_ground))
+    places, widths = np.tile(lattice_ground, (len(body.heights), 1)), body.width_of(heights)
     for view in views:
         for begin in range(0, len(heights), _PILLARS_AT_ONCE):
             block = slice(begin, begin + _PILLARS_AT_ONCE)
@@ -83,7 +83,7 @@ def _drawn(
 def _fill_boxes(outlines: PackedOutlines, heights: int, cells: int, boxes: Shorts, strips: Shorts) -> None:
     """Widen boxes (view, cell, 4) and strips (view, strip, 4), empty before, around the outlines."""
     for i in range(len(outlines.first)):
-        view, cell, row = i // (heights * cells), i // heights % cells, outlines.first[i]
+        view, cell, row = i // (heights * cells), i % cells, outlines.first[i]
         box, strip = boxes[view, cell], strips[view, cell // STRIP_CELLS]
         for k in range(outlines.start[i], outlines.start[i + 1]):
             left, right = outlines.spans[k]
