@@ -2,8 +2,8 @@
 
 import ast
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import pytest
@@ -75,15 +75,17 @@ class Module:
         """The part of the package that it belongs to: `stseg.io.recording.rigs` is of `io`."""
         return f"{self.name}.__init__".split(".")[1]
 
-    def imports(self) -> Iterator[str]:
+    @cached_property
+    def imports(self) -> set[str]:
         """Full names of what it imports; of `from a import b`, both a and a.b."""
+        names = set[str]()
         for node in ast.walk(self.tree):
             if isinstance(node, ast.Import):
-                yield from (alias.name for alias in node.names)
+                names |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 assert node.level == 0, f"{self.name} line {node.lineno}: a relative import"
-                yield node.module or ""
-                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+                names |= {node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)}
+        return names
 
 
 def modules() -> list[Module]:
@@ -103,7 +105,7 @@ MODULES = modules()
 def parts_imported(module: Module) -> set[str]:
     """Parts of the package that a module imports, its own left out."""
     parts = {*FOUNDATION, SOLVER, *STAGES, *BESIDE, "engine", "tasks", "commands"}
-    taken = {name.split(".")[1] for name in module.imports() if name.startswith("stseg.")}
+    taken = {name.split(".")[1] for name in module.imports if name.startswith("stseg.")}
     assert taken <= parts, f"{module.name} imports {taken - parts}, of which no rule is known"
     return taken - {module.part}
 
@@ -132,7 +134,7 @@ def test_a_module_imports_what_stands_below_it(module: Module) -> None:
 
 @pytest.mark.parametrize("library", AT_HOME)
 def test_a_library_is_known_where_it_belongs(library: str) -> None:
-    at_home = [module for module in MODULES if library in {name.split(".")[0] for name in module.imports()}]
+    at_home = [module for module in MODULES if library in {name.split(".")[0] for name in module.imports}]
     for module in at_home:
         assert module.name.startswith(AT_HOME[library]), f"{module.name} imports {library}"
     assert at_home, f"nothing imports {library}"
@@ -141,7 +143,7 @@ def test_a_library_is_known_where_it_belongs(library: str) -> None:
 def test_every_other_library_is_numpy_scipy_or_of_python_itself() -> None:
     known = {*AT_HOME, *NEEDED, *sys.stdlib_module_names, "stseg"}
     for module in MODULES:
-        assert {name.split(".")[0] for name in module.imports()} <= known, module.name
+        assert {name.split(".")[0] for name in module.imports} <= known, module.name
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
