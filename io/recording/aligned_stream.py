@@ -13,15 +13,17 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Observation
+from stseg.arrays import Floats, Ints, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.streams import Stream, open_stream
-from stseg.io.recording.time_alignment import align_in_time, frame_coverage, with_alignment
+from stseg.io.recording.time_alignment import align_in_time, visible_ranges, with_alignment
+from stseg.io.recording.video.time_stamps import pack_stamps, unpack_stamps
 
 
 class AlignedStream:
@@ -165,10 +167,14 @@ class StreamIndex:
     notes: tuple[str, ...] = ()
     """Messages for the user, one line each."""
 
-    def frame_coverage(self, recording: Recording) -> Flags:
-        """Which frames of the indexed recording each camera shows, bool (camera, length)."""
+    def __reduce__(self) -> tuple[Any, ...]:
+        packed = tuple(tuple(map(pack_stamps, files)) for files in self.times)
+        return _unpacked, (self.length, packed, self.frame_at_tick, self.notes)
+
+    def visible_ranges(self, recording: Recording) -> list[Ints]:
+        """The frames of the indexed recording that each camera shows, half-open ranges, int64 (range, 2)."""
         counts = [sum(map(len, files)) for files in self.times]
-        return frame_coverage(with_alignment(recording, self.frame_at_tick), counts, self.length)
+        return visible_ranges(with_alignment(recording, self.frame_at_tick), counts, self.length)
 
     def multi_view_range(self, recording: Recording) -> tuple[int, int]:
         """First and stop of the part that at least two cameras show; all of it where a camera is required throughout.
@@ -177,8 +183,15 @@ class StreamIndex:
         """
         if any(source.on_missing == "error" for source in recording.sources):
             return 0, self.length
-        multiple = np.flatnonzero(self.frame_coverage(recording).sum(axis=0) >= min(2, len(recording.sources)))
-        return (int(multiple[0]), int(multiple[-1]) + 1) if len(multiple) else (0, self.length)
+        edges = np.concatenate(self.visible_ranges(recording)).ravel()
+        frames, places = np.unique(edges, return_inverse=True)
+        views = np.cumsum(np.bincount(places.ravel(), np.resize([1, -1], len(edges)), len(frames)))
+        multiple = np.flatnonzero(views >= min(2, len(recording.sources)))
+        return (int(frames[multiple[0]]), int(frames[multiple[-1] + 1])) if len(multiple) else (0, self.length)
+
+
+def _unpacked(length: int, times: Sequence[Sequence[Floats]], *rest: Any) -> StreamIndex:
+    return StreamIndex(length, tuple(tuple(map(unpack_stamps, files)) for files in times), *rest)
 
 
 def require_own_sources(recording: Recording) -> None:

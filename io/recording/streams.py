@@ -14,6 +14,7 @@ from stseg.io.detections.source_detections import instance_image, read_source
 from stseg.io.recording.pictures import read_picture, reduced_view
 from stseg.io.recording.recording import Source, mask_passwords
 from stseg.io.recording.source_files import image_paths, is_detection_file, is_image_source, source_parts
+from stseg.io.recording.video.time_stamps import no_stamps
 from stseg.io.recording.video.video_stream import VideoStream
 
 
@@ -54,7 +55,7 @@ class CountedStream:
 
     def times(self) -> list[Floats]:
         """Skip the rest: there are no time stamps."""
-        return [np.full(self.skip(self._frames), np.nan)]
+        return [no_stamps(self.skip(self._frames))]
 
     def close(self) -> None:
         """Nothing is held open."""

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Floats, Ints
 from stseg.errors import SourceError
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.source_files import source_parts
@@ -61,7 +61,9 @@ class _CameraTimes:
     source: CameraSource
     has_stamps: bool
     stamps: TimeStamps | None
+    frames: int
     counted: Floats
+    """Empty where neither stamps nor starts nor damage are compared with them."""
     damage: str
     """Frames that its files lost, as a message; empty where they are whole."""
 
@@ -150,18 +152,19 @@ def nearest_frames(position: Floats, period: float) -> Ints:
     return frame_at_tick
 
 
-def frame_coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
-    """Which frames of a recording that is aligned in time each camera shows, bool (camera, length).
+def visible_ranges(recording: Recording, counts: Sequence[int], length: int) -> list[Ints]:
+    """The frames of a recording that each camera shows: half-open ranges, int64 (range, 2), rising.
 
-    `counts` are the numbers of frames of the cameras, `length` that of the recording.
+    `counts` are the numbers of frames of the cameras, `length` that of the recording, which is aligned in time.
     """
-    flags = np.zeros((len(counts), length), bool)
-    for flag, source, count in zip(flags, recording.sources, counts, strict=True):
-        shows = np.ones(count, bool) if source.frame_at_tick is None else source.frame_at_tick >= 0
-        shows = shows[max(0, -source.offset) :][: max(0, length - max(0, source.offset))]
-        first = max(0, source.offset)
-        flag[first : first + len(shows)] = shows
-    return flags
+    found = list[Ints]()
+    for source, count in zip(recording.sources, counts, strict=True):
+        edges = np.array([0, count])
+        if source.frame_at_tick is not None:
+            edges = np.flatnonzero(np.diff(np.concatenate([[-1], source.frame_at_tick, [-1]]) >= 0))
+        ranges = np.clip(edges.reshape(-1, 2) + source.offset, 0, length)
+        found.append(ranges[ranges[:, 0] < ranges[:, 1]])
+    return found
 
 
 def _camera_times(name: str, source: CameraSource, times: Sequence[Floats], rate: float) -> _CameraTimes:
@@ -169,11 +172,14 @@ def _camera_times(name: str, source: CameraSource, times: Sequence[Floats], rate
     require_starts(source.source.starts, len(paths), source.source.path, f"camera {name}, source.starts")
     starts = np.array(source.source.starts, float)
     lost = [lost_frames(path, len(stamps)) for path, stamps in zip(paths, times, strict=True)]
-    numbers = [_numbers(len(stamps), gone) for stamps, gone in zip(times, lost, strict=True)]
-    counted = concatenate_files(numbers, 1.0, rate, paths, starts)
     damage = "; ".join(_damage(path, gone) for path, gone in zip(paths, lost, strict=True) if gone is None or len(gone))
     stamps = None if damage else interpret_stamps(times, rate, paths, starts)
-    return _CameraTimes(name, source, have_stamps(times, paths), stamps, counted, damage)
+    counted = np.zeros(0)
+    if damage or stamps is not None or len(starts):
+        numbers = [_numbers(len(one), gone) for one, gone in zip(times, lost, strict=True)]
+        counted = concatenate_files(numbers, 1.0, rate, paths, starts)
+    frames = sum(map(len, times))
+    return _CameraTimes(name, source, have_stamps(times, paths), stamps, frames, counted, damage)
 
 
 def _numbers(decoded: int, lost: Ints | None) -> Floats:
@@ -236,14 +242,14 @@ def _trusted_stamps(camera: _CameraTimes, others: Sequence[_CameraTimes], rate: 
 
 def _same_count(camera: _CameraTimes, stamps: TimeStamps, references: Sequence[_CameraTimes]) -> bool:
     """Whether a camera has as many frames as a reference at the rig's rate, but by its stamps another end."""
-    count, by_time = len(camera.counted), stamps.position[-1] + stamps.period
+    count, by_time = camera.frames, stamps.position[-1] + stamps.period
     ends = [_end(other) for other in references]
     return any(abs(count - end) <= _COUNT_TOLERANCE * end and abs(count - end) < abs(by_time - end) for end in ends)
 
 
 def _end(camera: _CameraTimes) -> float:
     """End of a camera's frames by its stamps, ticks."""
-    return float(camera.stamps.position[-1] + camera.stamps.period) if camera.stamps else float(len(camera.counted))
+    return float(camera.stamps.position[-1] + camera.stamps.period) if camera.stamps else float(camera.frames)
 
 
 def _with_common_end(
@@ -254,7 +260,7 @@ def _with_common_end(
     The end is that of counted cameras, else the latest of all; cameras that end earlier are blind until then.
     """
     required = [k for k, camera in enumerate(cameras) if camera.source.on_missing == "error"]
-    counted = [cameras[k].source.offset + len(cameras[k].counted) for k in required if frame_at_tick[k] is None]
+    counted = [cameras[k].source.offset + cameras[k].frames for k in required if frame_at_tick[k] is None]
     timed = {k: cameras[k].source.offset + len(numbers) for k in required if (numbers := frame_at_tick[k]) is not None}
     if not timed:
         return tuple(frame_at_tick)

@@ -27,7 +27,7 @@ def read_bytes(path: Path, most: int = limits.TEXT_FILE) -> bytes:
             raise IsADirectoryError(21, "Is a directory")
         if not stat.S_ISREG(state.st_mode):
             raise ValueError("what is no regular file")
-        data = file.read(most + 1)
+        data = file.read(min(most, max(state.st_size, limits.LINE)) + 1)  # so much memory is taken at once
     if len(data) > most:
         raise ValueError(f"more than {most} bytes")
     return data

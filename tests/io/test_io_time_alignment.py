@@ -1,6 +1,7 @@
 """Temporal alignment of cameras: trusted stamps and nearest frames."""
 
 import pickle
+import tracemalloc
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,8 +24,8 @@ from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.recording.time_alignment import (
     TimeAlignment,
     align_in_time,
-    frame_coverage,
     nearest_frames,
+    visible_ranges,
     with_alignment,
 )
 from stseg.io.recording.video.time_stamps import concatenate_files, interpret_stamps
@@ -225,21 +226,20 @@ def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None
     for count, offset, timed in cameras:
         frame_at_tick = np.where(rng.random(count) < 0.7, np.arange(count), -1) if timed else None
         sources.append(video(offset=offset, frame_at_tick=frame_at_tick))
-    flags = frame_coverage(recording(*sources), [count for count, _, _ in cameras], length)
-    for own, source, (count, offset, _) in zip(flags, sources, cameras, strict=True):
+    shown = visible_ranges(recording(*sources), [count for count, _, _ in cameras], length)
+    for own, source, (count, offset, _) in zip(shown, sources, cameras, strict=True):
         for frame in range(length):
             tick = frame - offset
             expected = 0 <= tick < count and (source.frame_at_tick is None or source.frame_at_tick[tick] >= 0)
-            assert own[frame] == expected
+            assert any(first <= frame < stop for first, stop in own) == expected
 
 
 def test_gaps_are_what_nobody_sees_for_long() -> None:
-    flags = np.zeros((2, 30), bool)
-    flags[0, 2:8], flags[1, 6:10], flags[1, 15:22], flags[0, 24:29] = True, True, True, True
-    assert find_gaps(flags, 0, 30, 2) == [(10, 15)]
-    assert find_gaps(flags, 0, 30, 1) == [(0, 2), (10, 15), (22, 24)]
-    assert find_gaps(flags, 12, 23, 2) == [(12, 15)]
-    assert find_gaps(flags, 11, 14, 2) == [(11, 14)]
+    shown = [np.array([[2, 8], [24, 29]]), np.array([[6, 10], [15, 22]])]
+    assert find_gaps(shown, 0, 30, 2) == [(10, 15)]
+    assert find_gaps(shown, 0, 30, 1) == [(0, 2), (10, 15), (22, 24)]
+    assert find_gaps(shown, 12, 23, 2) == [(12, 15)]
+    assert find_gaps(shown, 11, 14, 2) == [(11, 14)]
 
 
 def shown_number(view: Observation) -> int | None:
@@ -277,7 +277,20 @@ def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
         with open_frames(uneven, first, min(first + 2, 20), streams) as reader:
             assert [tuple(map(shown_number, frame_set.views)) for frame_set in reader] == views[first : first + 2]
     assert [shown_number(view) for view in read_camera(uneven, 1, [4, 6, 13], streams)] == [4, None, 10]
-    assert streams.frame_coverage(uneven).sum(axis=1).tolist() == [20, 17, 19]
+    assert [int(np.diff(own).sum()) for own in streams.visible_ranges(uneven)] == [20, 17, 19]
+
+
+def test_frames_without_stamps_cost_no_memory(tmp_path: Path) -> None:
+    (tmp_path / "boxes.csv").write_text("frame,left,top,width,height\n5,1,2,3,4\n19999990,1,2,3,4\n")
+    far = recording(CameraSource(Source("boxes", tmp_path / "boxes.csv")))
+    tracemalloc.start()
+    streams = pickle.loads(pickle.dumps(index_streams(far)))
+    with WorkFolder(tmp_path / "run.h5", {}) as work:
+        work.keep_streams(streams)
+        kept = work.streams(far)
+    assert tracemalloc.get_traced_memory()[1] < 60e6
+    tracemalloc.stop()
+    assert [index and index.multi_view_range(far) for index in (streams, kept)] == [(0, 19_999_991)] * 2
 
 
 def test_cameras_that_end_apart_by_stamps_are_refused(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 from stseg.errors import SourceError
 
 _RESOLUTION = 0.002
@@ -67,6 +67,8 @@ def interpret_stamps(
     starts : float64 (file,)
         Start of each file, seconds; empty where files follow one another.
     """
+    if any(np.isnan(stamps[:1]).any() for stamps in times):
+        return None
     files = [(stamps - stamps[:1]) / 1000 * frame_rate for stamps in times]
     if not all(np.isfinite(stamps).all() and _rises(np.diff(stamps), _LONGEST_GAP * frame_rate) for stamps in files):
         return None
@@ -80,6 +82,21 @@ def interpret_stamps(
         return None
     period = mean if steady else float(np.median(steps))
     return TimeStamps(concatenate_files(files, period, frame_rate, paths, starts), period, steady)
+
+
+def no_stamps(frames: int) -> Floats:
+    """The stamps of a file that has none: nan for each frame, float64 (n,), in the memory of one."""
+    return np.broadcast_to(np.nan, frames)
+
+
+def pack_stamps(stamps: Floats) -> Floats | Ints:
+    """Stamps to store or send: as they are, or the number of frames where there are none, int64 (1,)."""
+    return np.array([len(stamps)], np.int64) if np.isnan(stamps).all() else stamps
+
+
+def unpack_stamps(packed: Floats | Ints) -> Floats:
+    """The stamps of `pack_stamps`."""
+    return no_stamps(int(packed[0])) if packed.dtype == np.int64 else packed.astype(float)
 
 
 def have_stamps(times: Sequence[Floats], paths: Sequence[Path]) -> bool:

@@ -14,6 +14,7 @@ from stseg.io.outputs.whole_files import replacing, sync_folder
 from stseg.io.recording.aligned_stream import StreamIndex, index_from_times
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.source_files import source_parts
+from stseg.io.recording.video.time_stamps import pack_stamps, unpack_stamps
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import is_regular
 from stseg.io.untrusted.numpy_files import read_npz
@@ -62,7 +63,10 @@ def read_stream_times(path: Path, recording: Recording) -> StreamIndex | None:
     """The stream index of stored time stamps; None where there are none, or not of this recording."""
     try:
         stored = read_npz(path, _STAMPS)
-        times = tuple(tuple(_stamps(stored, k, one)) for k, one in enumerate(_counts(stored)))
+        times = tuple(
+            tuple(_stamps(stored.get(f"times{k}_{file}")) for file in range(one))
+            for k, one in enumerate(_counts(stored))
+        )
     except (OSError, ValueError):
         return None
     expected = [len(source_parts(source.timed, "")) for source in recording.sources]
@@ -70,8 +74,8 @@ def read_stream_times(path: Path, recording: Recording) -> StreamIndex | None:
 
 
 def write_stream_times(path: Path, streams: StreamIndex) -> None:
-    """Store the time stamps of all streams, whole or not at all."""
-    times = {f"times{k}_{j}": one for k, files in enumerate(streams.times) for j, one in enumerate(files)}
+    """Store the time stamps of all streams, whole or not at all; of a file without any, its number of frames."""
+    times = {f"times{k}_{j}": pack_stamps(one) for k, files in enumerate(streams.times) for j, one in enumerate(files)}
     files = np.array([len(one) for one in streams.times], np.int64)
     with replacing(path, overwrite=True) as part, part.open("wb") as file:
         np.savez_compressed(file, files=files, **times)  # type: ignore[arg-type]
@@ -87,9 +91,11 @@ def _counts(stored: Any) -> list[int]:
     return [int(count) for count in files]
 
 
-def _stamps(stored: Any, camera: int, files: int) -> list[Floats]:
-    """The time stamps of one camera's files; ValueError where they are none."""
-    found = [stored.get(f"times{camera}_{file}") for file in range(files)]
-    if any(one is None or one.ndim != 1 or one.dtype != np.float64 or len(one) > limits.FRAMES for one in found):
+def _stamps(stored: Any) -> Floats:
+    """The time stamps of a file; ValueError where they are none."""
+    counts = stored is not None and stored.dtype == np.int64 and stored.shape == (1,)
+    if stored is None or stored.ndim != 1 or not (counts or stored.dtype == np.float64):
         raise ValueError("no time stamps")
-    return [np.array(one, float) for one in found]
+    if not 0 <= (stored[0] if counts else len(stored)) <= limits.FRAMES:
+        raise ValueError("more time stamps than a recording has frames")
+    return unpack_stamps(stored)

@@ -163,7 +163,8 @@ def _covered_frames(recording: Recording, camera: int, part: range, streams: Str
     if streams is None:
         delay = max(0, recording.sources[camera].offset - part.start)
         return range(part.start + delay, part.stop + delay)
-    frames = np.flatnonzero(streams.frame_coverage(recording)[camera])
+    ranges = streams.visible_ranges(recording)[camera].tolist()
+    frames = np.concatenate([np.arange(*one) for one in ranges] or [np.arange(0)])
     begin, end = frames.searchsorted([part.start, part.stop]).tolist()
     lacking = len(part) - (end - begin)
     begin = max(0, min(begin - lacking // 2, len(frames) - len(part)))

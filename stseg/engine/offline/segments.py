@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Flags
+from stseg.arrays import Ints
 from stseg.config import Config, TrackingConfig
 from stseg.tracking.windows.windows import window_length
 
@@ -73,21 +73,22 @@ def longest_absence(config: TrackingConfig) -> float:
     return max(config.patience, config.maximum_gap, config.interpolation_gap)
 
 
-def find_gaps(covered: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
+def find_gaps(ranges: Sequence[Ints], first: int, stop: int, longest: float) -> list[tuple[int, int]]:
     """Gaps of a recording: half-open ranges of frames in which all cameras are blind.
 
     Parameters
     ----------
-    covered : bool (camera, frame)
-        Frames in which each camera has an image.
+    ranges : int64 (range, 2) each
+        Frames in which each camera has an image, half-open ranges.
     first, stop
         The frames of the run, half open.
     longest
         Greatest length of an interruption that is not a gap, frames.
     """
-    blind = np.concatenate([[False], ~covered[:, first:stop].any(axis=0), [False]])
-    edges = first + np.flatnonzero(np.diff(blind.astype(np.int8)))
-    return [(begin, end) for begin, end in edges.reshape(-1, 2).tolist() if end - begin > longest]
+    within = np.clip(np.concatenate([[[first, first]], *ranges, [[stop, stop]]]), first, stop)
+    begins, ends = within[within[:, 0].argsort(kind="stable")].T
+    reached = np.maximum.accumulate(ends)[:-1].tolist()
+    return [(begin, end) for begin, end in zip(reached, begins[1:].tolist(), strict=True) if end - begin > longest]
 
 
 def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Segment]:
