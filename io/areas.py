@@ -20,10 +20,8 @@ Named = tuple[str, tuple[Floats, ...]]
 
 def read_polygons(path: Path) -> list[Named]:
     """Polygons of a GeoJSON file: name, and rings in metres."""
-    return [
-        (name, tuple(_rings(path, name, parts)))
-        for name, parts in _features(path, {"Polygon": lambda rings: [rings], "MultiPolygon": list}, "zone")
-    ]
+    kinds = {"Polygon": lambda rings: [rings], "MultiPolygon": lambda polygons: polygons}
+    return [(name, tuple(_rings(path, name, parts))) for name, parts in _features(path, kinds, "zone")]
 
 
 def _rings(path: Path, name: str, polygons: Any) -> Iterator[Floats]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Grid, Rig
+from stseg.geometry.fits import fit_homography, fit_vertical
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import write_rig
 
@@ -44,41 +45,8 @@ def fit_camera(name: str, ground: Floats, rectangle: Floats) -> Camera:
     middle = (left + right) / 2
     homography = fit_homography(ground[whole], np.stack([middle, bottom], -1)[whole])
     headed = whole & (top > 0)
-    return Camera(name, SIZE, homography, fit_vertical(homography, ground[headed], np.stack([middle, top], -1)[headed]))
-
-
-def fit_homography(ground: Floats, pixel: Floats) -> Floats:
-    """Direct linear transform with both sides brought to about unit size; float64 (3, 3), metres to pixels."""
-    to_unit, from_unit = _unit(ground), np.linalg.inv(_unit(pixel))
-    x, y, one = to_unit @ _homogeneous(ground)
-    u, v, _ = _unit(pixel) @ _homogeneous(pixel)
-    zero = np.zeros_like(x)
-    along_u = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y, -u], -1)
-    along_v = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y, -v], -1)
-    unit = np.linalg.svd(np.concatenate([along_u, along_v]))[2][-1].reshape(3, 3)
-    homography = from_unit @ unit @ to_unit
-    return np.asarray(homography / np.linalg.norm(homography[2]))
-
-
-def fit_vertical(homography: Floats, ground: Floats, head: Floats) -> Floats:
-    """What one metre adds to the third column: least squares over heads `BODY` above the ground; float64 (3,)."""
-    foot_u, foot_v, scale = homography @ _homogeneous(ground)
-    u, v = head.T
-    zero, one = np.zeros_like(u), np.ones_like(u)
-    along_u = np.stack([one, zero, -u], -1) / scale[:, None]
-    along_v = np.stack([zero, one, -v], -1) / scale[:, None]
-    wanted = np.concatenate([u - foot_u / scale, v - foot_v / scale])
-    return np.asarray(np.linalg.lstsq(np.concatenate([along_u, along_v]), wanted)[0] / BODY)
-
-
-def _unit(point: Floats) -> Floats:
-    """The similarity that brings points to mean 0 and unit size."""
-    middle, size = point.mean(axis=0), point.std()
-    return np.array([[1 / size, 0, -middle[0] / size], [0, 1 / size, -middle[1] / size], [0, 0, 1]])
-
-
-def _homogeneous(point: Floats) -> Floats:
-    return np.concatenate([point.T, np.ones((1, len(point)))])
+    heads = np.stack([middle, top], -1)[headed]
+    return Camera(name, SIZE, homography, fit_vertical(homography, ground[headed], np.full(len(heads), BODY), heads))
 
 
 def main(folder: Path, output: Path) -> None:

@@ -43,14 +43,14 @@ def fuzz(target: Target, first: int, until: float, most: int) -> tuple[int, list
     failures: list[Failure] = []
     seed, stop = first, first + most
     while seed < stop and time.monotonic() < until:
-        seed, failure = _until_failure(target, seed, until, stop)
+        seed, failure = until_failure(target, seed, until, stop)
         if failure is not None:
             failures.append(failure)
             seed += 1
     return seed - first, failures
 
 
-def _until_failure(target: Target, first: int, until: float, stop: int) -> tuple[int, Failure | None]:
+def until_failure(target: Target, first: int, until: float, stop: int) -> tuple[int, Failure | None]:
     """A child process works on seeds until one fails; the seed that it came to."""
     shared = mmap.mmap(-1, 4096)
     shared[:16] = struct.pack("<qd", first, time.monotonic())

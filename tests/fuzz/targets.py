@@ -6,6 +6,7 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from functools import partial
 from io import StringIO
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from run_files import small_trajectory, write_small_run
 from fuzz import corpus
 from fuzz.corpus import GREY, RAMP, Maker, encoded, text
 from fuzz.mutations import mutated, mutated_objects
+from fuzz.oracles import require_boxes, require_config, require_rig, require_tracks
+from stseg.arrays import Boxes
 from stseg.calibration.points.point_fit import Points, fit_points
 from stseg.commands.calibrate.page import calibrate_page
 from stseg.commands.correct import correct
@@ -75,6 +78,7 @@ def answer(target: Target, path: Path) -> str:
     except StsegError as error:
         line = str(error)
         assert "\n" not in line.strip() or len(line) < 1000, line
+        assert str(path.parent) in line or target.read is _points, line  # arrays have no file
         return line
     return ""
 
@@ -88,10 +92,11 @@ _NOTES = {"config": {"a": 1}, "rig": {"b": "c"}}
 
 
 def _frames_of(source: Source) -> None:
-    """Read the first frames."""
+    """Read the first frames, and what was accepted once more."""
     stream = open_stream(source, CAMERA)
-    any(stream.read() is None for _ in range(_FRAMES))
+    views = list(takewhile(lambda view: view is not None, (stream.read() for _ in range(_FRAMES))))
     stream.close()
+    require_boxes([view for view in views if isinstance(view, Boxes)], CAMERA, source.path.parent)
 
 
 def _frames(kind: SourceKind) -> Reader:
@@ -250,10 +255,10 @@ TARGETS = (
     Target("label_studio.json", _frames("instances")),
     Target("label_studio_video.json", _frames("boxes")),
     Target("via.json", _frames("instances")),
-    Target("rig.toml", lambda path: parse_rig(path.read_text("utf-8", "replace"), path)),
-    Target("rig_file.toml", read_recording, lambda _: text("rig.toml")),
-    Target("config.toml", read_config),
-    Target("tracks.csv", read_tracks_csv),
+    Target("rig.toml", lambda path: require_rig(parse_rig(path.read_text("utf-8", "replace"), path))),
+    Target("rig_file.toml", lambda path: require_rig(read_recording(path)), lambda _: text("rig.toml")),
+    Target("config.toml", lambda path: require_config(read_config(path), path.parent)),
+    Target("tracks.csv", lambda path: require_tracks(read_tracks_csv(path), path.parent)),
     Target("points.csv", read_points),
     Target("eight_points.csv", _points),
     Target("zones.geojson", _zones),

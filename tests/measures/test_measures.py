@@ -126,6 +126,7 @@ def test_the_command_writes_tables_and_python_gives_the_same(
         (json.dumps(feature("Polygon", [[[0, 0], [1, 1]]])), "a: found 2 points, expected 3 or more"),
         (json.dumps(feature("Polygon", [["x"]])), "a: found coordinates that are no points"),
         (json.dumps(feature("Polygon", 7)), "a: found coordinates that are no points"),
+        (json.dumps(feature("MultiPolygon", None)), "a: found coordinates that are no points"),
         (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, "1"]]])), "a: found coordinates that are no points"),
         (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1e300, 1]]])), "a: found coordinates that are no points"),
         (json.dumps(feature("Polygon", [[[0, 0]] * 20_000])), "a: found 20000 points, expected at most 10000"),

@@ -11,7 +11,6 @@ from recordings import data_path
 from scenes import looking, rig_of
 
 from stseg.evaluation import evaluate
-from stseg.geometry import Camera
 from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 
@@ -109,19 +108,6 @@ def test_sets_are_commands_that_exist() -> None:
 def test_an_unknown_name_is_refused(option: list[str]) -> None:
     with pytest.raises(SystemExit, match="uu5: expected names among"):
         results.main(option)
-
-
-def test_pom_camera_is_fitted_to_its_rectangles() -> None:
-    homography = [[60.0, 35.0, 40.0], [4.0, -9.0, 110.0], [0.02, 0.12, 1.0]]
-    camera = Camera("c", (160, 120), np.array(homography), np.array([0.5, -40.0, 0.01]))
-    ground = np.random.default_rng(3).uniform(0, 1.2, (60, 2))
-    (u, bottom), (_, top) = (camera.project(ground, height)[0].T for height in (0.0, pom_rig.BODY))
-    head_u = camera.project(ground, pom_rig.BODY)[0][:, 0]
-    fitted = pom_rig.fit_homography(ground, np.stack([u, bottom], -1))
-    vertical = pom_rig.fit_vertical(fitted, ground, np.stack([head_u, top], -1))
-    scale = camera.ground[2, 2] / fitted[2, 2]
-    np.testing.assert_allclose(fitted * scale, camera.ground, atol=1e-8)
-    np.testing.assert_allclose(vertical * scale, camera.vertical, atol=1e-8)
 
 
 def test_pom_rig_sees_bodies_where_the_recording_says(tmp_path: Path) -> None:

@@ -29,20 +29,6 @@ from workbench import ROOT, Bench
 
 _UNCOMPARED = ("timings", "provenance")
 """Parts of a run file in which equal runs differ."""
-RENAMED = {
-    "rates.beside": "rates.person_clutter",
-    "rates.filled": "rates.occupied_share",
-    "rates.aside": "rates.residual",
-    "answered.row": "answers.row",
-    "answered.other": "answers.other",
-    "answered.same": "answers.people",
-    "known.id": "known_people.id",
-    "known.height": "known_people.height",
-    "known.heights": "known_people.height_count",
-    "known.colours": "known_people.colours",
-    "known.looks": "known_people.appearance_count",
-}
-"""Column or dataset of the base, and its name now."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +142,6 @@ def demo(folder: Path, bench: Bench, output: Path) -> dict[str, str]:
 
 def differences(before: dict[str, str], now: dict[str, str]) -> list[str]:
     """Names of datasets and columns that differ."""
-    before = {RENAMED.get(name, name): digest for name, digest in before.items()}
     return sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
 
 
