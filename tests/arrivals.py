@@ -8,7 +8,7 @@ from threading import Thread
 
 import numpy as np
 from films import write_at_rate
-from recordings import FRAMES, PLACES, filmed_rig
+from recordings import PLACES, filmed_rig
 from scenes import mask, standing_at, walkers
 
 from stseg.arrays import AnyArray, Bytes
@@ -18,6 +18,7 @@ from stseg.io.recording.rig_text import format_rig
 
 PIECE = 10
 """Frames of each of its files."""
+FRAMES = 4 * PIECE
 
 
 def films(rig: Rig, frames: int = FRAMES) -> list[list[Bytes]]:

@@ -17,7 +17,7 @@ from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 from stseg.kernels.accelerate import COMPILED
 
-FRAMES = 40
+FRAMES = 28
 PLACES = {"west": (-3.5, -3.5, 2.6), "east": (3.5, -3.4, 2.6), "north": (0.0, 3.6, 2.6)}
 OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "detection.lattice_spacing=0.25")
 """Segments of six frames."""
@@ -68,17 +68,17 @@ def filmed_rig() -> Rig:
     return rig_of([looking(name, place) for name, place in PLACES.items()])
 
 
-def write_recording(folder: Path) -> Path:
+def write_recording(folder: Path, frames: int = FRAMES) -> Path:
     """The recording, in a folder that exists; its rig file."""
     rig = filmed_rig()
     lines = {name: ["frame,left,top,width,height"] for name in PLACES}
-    for frame_set in box_frame_sets(rig, walkers(FRAMES), 0, FRAMES):
+    for frame_set in box_frame_sets(rig, walkers(frames), 0, frames):
         for name, view in zip(PLACES, frame_set.views, strict=True):
             assert isinstance(view, Boxes)
             lines[name] += [f"{frame_set.frame},{','.join(map(repr, row))}" for row in view.pixel.tolist()]
     for name, text in lines.items():
         (folder / f"{name}.csv").write_text("\n".join(text) + "\n")
-    streams = tuple(CameraSource(Source("boxes", folder / f"{name}.csv", 0, FRAMES)) for name in PLACES)
+    streams = tuple(CameraSource(Source("boxes", folder / f"{name}.csv", 0, frames)) for name in PLACES)
     path = folder / "rig.toml"
     path.write_text(format_rig(Recording(path, rig, streams), path))
     return path

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import recordings
-from arrivals import StandIn, arrive, films, meanwhile, write_pieces
+from arrivals import FRAMES, StandIn, arrive, films, meanwhile, write_pieces
 from films import write_at_rate
-from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, filmed_rig, run_words, started
+from recordings import COMMAND, PLACES, assert_same, compiled_only, filmed_rig, run_words, started
 from refusals import Command
 from run_files import table_of, trajectory_of
 from scenes import walkers

@@ -149,8 +149,8 @@ def test_a_flipped_byte_is_noticed_and_its_segment_made_anew(
 
 def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, halfway: Path) -> None:
     folder = segments_of(halfway)[0].parent
-    (folder / "segment-00005.h5").write_bytes(b"half")
-    (folder / "segment-00004.h5.part").write_bytes(b"half")
+    (folder / "segment-00003.h5").write_bytes(b"half")
+    (folder / "segment-00003.h5.part").write_bytes(b"half")
     assert track(rig_path, halfway) == 0
     assert_same(halfway, undisturbed)
 
@@ -160,7 +160,7 @@ def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, ha
     [
         (("--set", "detection.prior_log_odds=-3"), "config.detection.prior_log_odds: found -3.0, where .* has -4.0"),
         (("--tracker", "frames"), "--tracker: found frames, where .* has cut"),
-        (("--frames", "0:30"), "--frames: found 0:30, where .* has all"),
+        (("--frames", "0:20"), "--frames: found 0:20, where .* has all"),
         (("--volume", "none"), "--volume: found none, where .* has all"),
     ],
 )
@@ -262,7 +262,7 @@ def test_changed_sources_are_refused(rig_path: Path, halfway: Path, refusal: Com
     source = rig_path.parent / "east.csv"
     before, state = source.read_text(), source.stat()
     try:
-        source.write_text(before + "39,1,1,2,2\n")
+        source.write_text(before + f"{FRAMES - 1},1,1,2,2\n")
         assert "source.east, frames: found" in refusal(*run_words(rig_path, halfway))
     finally:
         source.write_text(before)
@@ -301,7 +301,7 @@ def test_a_full_disk_loses_no_segment(
 ) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
-    if not _mount(disk, "400k"):
+    if not _mount(disk, "280k"):
         pytest.skip("needs leave to mount a small disk")
     try:
         assert track(rig_path, disk / "night.h5") == 2

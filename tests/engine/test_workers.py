@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import distributed
 import pytest
-from recordings import ENVIRONMENT, assert_same, compiled_only, run_words, track, write_recording
+from recordings import ENVIRONMENT, FRAMES, assert_same, compiled_only, run_words, track, write_recording
 from refusals import Command
 from scenes import corner_cameras, rig_of
 
@@ -77,8 +77,8 @@ def test_what_a_worker_finds_wrong_is_one_line(tmp_path: Path, refusal: Command)
     rig = write_recording(tmp_path)
     boxes = tmp_path / "east.csv"
     lines = boxes.read_text().splitlines()
-    boxes.write_text("\n".join(line for line in lines if not line.startswith("39,")) + "\n")
-    rig.write_text(rig.read_text().replace("frames = 40", "frames = 39", 1))
+    boxes.write_text("\n".join(line for line in lines if not line.startswith(f"{FRAMES - 1},")) + "\n")
+    rig.write_text(rig.read_text().replace(f"frames = {FRAMES}", f"frames = {FRAMES - 1}", 1))
     refusal(*run_words(rig, tmp_path / "run.h5", "--workers", "2"))
 
 
