@@ -23,7 +23,7 @@ _PRIOR_MEAN = np.zeros(SIZE)
 _PRIOR_MEAN[FOCAL], _PRIOR_MEAN[3] = np.log(0.85), -0.15
 _LENS_SPREAD = {FOCAL: 0.05, 3: 0.05, 4: 0.05}
 """Standard deviations of log focal length, k1 and k2 between cameras of one make."""
-_TOE_MEAN, _TOE_SPREAD = np.array([0.20, 0.14]), np.array([0.025, 0.025])
+_TOE_MEAN, _TOE_SPREAD = np.array([0.16, 0.12]), np.array([0.05, 0.04])
 """Prior of `BundleParameters.toe_offset`. It is tight: the data confuse it with the height of the ground, and the small
 errors of lens and tilt that no adjustment knows of would decide. Real shoes and half steps were measured."""
 _MAX_STEP_SPEED = 1.5
@@ -82,6 +82,8 @@ class Adjustment:
     residual: Floats
     """float64 (m, 2, 2): foot and head of each observation, observed minus predicted, along and across the body, in
     body lengths; nan behind a camera."""
+    freedom: Floats
+    """float64 (m, 2, 2): share of each residual's variance that the adjusted points have left, 0..1."""
 
 
 def adjust(parameters: BundleParameters, problem: BundleProblem) -> Adjustment:
@@ -100,8 +102,12 @@ def adjust(parameters: BundleParameters, problem: BundleProblem) -> Adjustment:
         gain, parameters, cost, damping = cost - lower, moved, lower, max(damping / 6, 1e-9)
         if gain < 1e-5 * cost:
             break
-    reduced, _ = _reduced(_system(parameters, problem), 0.0)
-    return Adjustment(parameters, _covariance(reduced, parameters), residuals(parameters, problem))
+    system = _system(parameters, problem)
+    reduced, inverse = _reduced(system, 0.0)
+    of_point = inverse[problem.correspondences.point]
+    freedom = 1 - np.einsum("mri,mij,mrj->mr", system.by_point, of_point, system.by_point, optimize=True)
+    covariance = _covariance(reduced, parameters)
+    return Adjustment(parameters, covariance, residuals(parameters, problem), freedom.reshape(-1, 2, 2))
 
 
 def _covariance(reduced: Floats, parameters: BundleParameters) -> Floats:
@@ -202,13 +208,14 @@ def same_make(views: Floats, size: Ints) -> Floats:
 
 @dataclass(frozen=True)
 class _System:
-    """Blocks of the normal equations: cameras, points, and the coupling between them."""
+    """Blocks of the normal equations: cameras, points, and the coupling; the weighted Jacobian in the points."""
 
     cameras: Floats
     camera_slope: Floats
     people: Floats
     people_slope: Floats
     between: Floats
+    by_point: Floats
 
 
 def _system(parameters: BundleParameters, problem: BundleProblem) -> _System:
@@ -256,7 +263,7 @@ def _normal(
     _, prior_slope, prior_curvature = _prior(parameters, problem)
     flat = rows.reshape(-1, rows.shape[2])
     cameras = flat.T @ flat + prior_curvature
-    return _System(cameras, flat.T @ weighted_residual.ravel() + prior_slope, people, people_slope, between)
+    return _System(cameras, flat.T @ weighted_residual.ravel() + prior_slope, people, people_slope, between, by_point)
 
 
 def _unit(k: int, size: int) -> Floats:

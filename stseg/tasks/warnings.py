@@ -19,6 +19,8 @@ from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 _BLIND_SHARE = 0.05
 """Share of the ground that no view sees from which there is a warning."""
+_CHECKED_FRAMES = 100
+"""Frames by which swapped cameras are found where views look wrong."""
 _MOVED = 1.0
 """Least shift of an image that counts as a moved camera, pixels."""
 
@@ -32,9 +34,15 @@ def run_warnings(run: Run) -> list[str]:
         *_emptiness(run),
         *source_warnings(run.recording),
         *track_warnings(run.frame_rate, run.trajectory),
-        *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
-        *body_warnings(run.cameras, run.trajectory, run.rates, body),
-        *rig_warnings(run),
+        *or_swapped(
+            run.recording,
+            int(run.frames[0]),
+            [
+                *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
+                *body_warnings(run.cameras, run.trajectory, run.rates, body),
+                *rig_warnings(run),
+            ],
+        ),
         *crowd_warnings(run.events),
     ]
 
@@ -50,6 +58,19 @@ def _emptiness(run: Run) -> Iterator[str]:
         yield "no view sees any cell"
     elif unseen > _BLIND_SHARE:
         yield f"no view sees {100 * unseen:.0f} % of the ground"
+
+
+def or_swapped(recording: Recording, first: int, warnings: list[str]) -> list[str]:
+    """The warnings of views, or that of two swapped cameras, by the frames from `first` of sources that still exist."""
+    if not warnings:
+        return []
+    from stseg.tasks.calibration.check import check_rig  # only here: other runs do without its libraries
+
+    try:
+        found = check_rig(recording, frames=(first, first + _CHECKED_FRAMES))
+    except InputError:
+        return warnings
+    return warnings if found.check.swapped is None else [found.verdict[0]]
 
 
 def source_warnings(recording: Recording) -> list[str]:

@@ -21,7 +21,7 @@ from stseg.calibration.automatic.auto import (
     sharpen_by_floor,
 )
 from stseg.calibration.automatic.correspondence import match_endpoints
-from stseg.calibration.automatic.endpoints import Endpoints, path_of, upright_endpoints
+from stseg.calibration.automatic.endpoints import Endpoints, upright_endpoints
 from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measured, scale_spread
 from stseg.calibration.automatic.single_view import view_of_upright
 from stseg.calibration.automatic.solution import SolvedViews, refine_cameras
@@ -107,20 +107,10 @@ def test_who_is_not_whole_free_and_upright_has_no_ends(bodies: list[tuple[float,
     assert upright_endpoints(painted(*bodies)).shape == (0, 2, 2)
 
 
-def test_paths_end_where_two_could_be_meant() -> None:
-    frame = np.repeat(np.arange(20), 2)
-    offsets = np.abs(np.arange(20) - 10.0)[:, None] * [5.0, 0.0] + [0.0, 200.0]
-    foot = np.array([300, 0]) + np.stack([offsets, offsets * [-1, 1]], 1).reshape(-1, 2)
-    endpoints = Endpoints(frame, foot, foot - [0, 60])
-    path = path_of(endpoints, 10.0).reshape(20, 2)
-    assert len(set(path[:7, 0])) == len(set(path[:7, 1])) == 1
-    assert not set(path[:7].ravel()) & set(path[14:].ravel())
-
-
 def true_walks(scene: Walking) -> list[ViewPaths]:
     """People on the ground that the true cameras have them on."""
     return [
-        ViewPaths(endpoints.frame, camera.back_project(endpoints.foot) @ np.array([1, 1j]), path_of(endpoints, 5.0))
+        ViewPaths(endpoints.frame, camera.back_project(endpoints.foot) @ np.array([1, 1j]))
         for camera, endpoints in zip(scene.rig.cameras, scene.views.endpoints, strict=True)
     ]
 
@@ -129,7 +119,7 @@ def true_walks(scene: Walking) -> list[ViewPaths]:
 @given(st.floats(-3, 3), st.integers(-8, 8))
 def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> None:
     a = true_walks(walking(2, 2, 30.0, 0))[0]
-    b = ViewPaths(a.frame + delay, np.exp(1j * turn) * a.place + 2 - 1j, a.path)
+    b = ViewPaths(a.frame + delay, np.exp(1j * turn) * a.place + 2 - 1j)
     best = align(a, b, 5.0, 10)[0]
     assert best.delay == delay and best.support > 0.9 * len(a.frame)
     assert abs(best.factor - np.exp(1j * turn)) < 0.02 and abs(best.shift - (2 - 1j)) < 0.05

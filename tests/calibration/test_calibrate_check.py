@@ -32,6 +32,7 @@ from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.reporting.pictures.overlay import grid_picture
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig
+from stseg.tasks.warnings import or_swapped
 
 RIG = ring()
 WALK = walkers(40)
@@ -185,6 +186,13 @@ class TestCommand:
         page = Path("check.html").read_text()
         assert "cam3 is off" in page and page.count("<img") == 5
         refused(OutputError, r"check.html: found a file that exists", run, "check", str(rig_file), "-o=check.html")
+
+    def test_a_run_blames_the_exchange_for_what_its_views_look_like(self, rig_file: Path) -> None:
+        recording, said = read_recording(rig_file), ["view cam2 denies most people"]
+        swapped = replace(recording, rig=exchanged(RIG, 1, 3))
+        assert or_swapped(recording, 0, said) == said and or_swapped(swapped, 0, []) == []
+        (warning,) = or_swapped(swapped, 0, said)
+        assert warning.startswith("cam2 and cam4 seem to be swapped")
 
     def test_as_json_of_some_frames(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run("check", str(rig_file), "--json", "--frames=4:40")

@@ -10,20 +10,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.optimize import approx_fprime
 
 from stseg.arrays import Floats
 from stseg.calibration.adjusted_rig import scaled
+from stseg.calibration.automatic.endpoints import even_rows
 from stseg.calibration.automatic.solution import SolvedViews
 from stseg.calibration.bundle_adjustment import adjust
-from stseg.calibration.pinhole import CENTRE, on_plane
+from stseg.calibration.pinhole import on_plane
 
 _MEAN_HEIGHT_SPREAD, _BODY_HEIGHT_SPREAD = 0.05, 0.09
 """Standard deviations of the mean height of people of one place, and between these people, metres."""
-_FORWARD_SPREAD = 0.06
-"""Standard deviation of the offset of feet between recordings, metres."""
 _PIXEL_SPREAD = 1.0
 """Standard deviation of a pixel that a person names."""
 _ROUNDS = 2
+_STEP_SIZE = 1e-5
+_FEET = 100
+"""Most feet of a view by which the size of the plan is known."""
 
 
 @dataclass(frozen=True)
@@ -38,19 +42,25 @@ class KnownDistance:
 
 def measured(solution: SolvedViews, known: Sequence[KnownDistance]) -> Floats:
     """Metres that a solution puts between the pixels of each distance; nan above the horizon."""
-    return np.array([_measured(solution, one, one.pixels) for one in known])
+    return np.array([_measured(solution, solution.adjustment.parameters.views, one, one.pixels) for one in known])
 
 
-def _measured(solution: SolvedViews, known: KnownDistance, pixels: Floats) -> float:
+def _measured(solution: SolvedViews, views: Floats, known: KnownDistance, pixels: Floats) -> float:
     width, height = solution.problem.size[known.view].tolist()
-    ground = on_plane(solution.adjustment.parameters.views[known.view], (width, height), pixels, 0.0)
+    ground = on_plane(views[known.view], (width, height), pixels, 0.0)
     return float(np.linalg.norm(ground[1] - ground[0]))
 
 
+def _shortage(solution: SolvedViews, known: Sequence[KnownDistance]) -> Floats:
+    """Logarithm of each distance over what the solution puts there, float64 (n,)."""
+    return np.asarray(np.log([one.metres for one in known]) - np.log(measured(solution, known)))
+
+
 def scaled_to(solution: SolvedViews, known: Sequence[KnownDistance]) -> SolvedViews:
-    """The solution scaled to the geometric mean of the distances' factors; nan where one is above the horizon."""
-    metres = np.array([one.metres for one in known])
-    return scaled(solution, float(np.exp(np.log(metres / measured(solution, known)).mean())))
+    """The solution scaled to the distances, by generalised least squares; nan where one is above the horizon."""
+    short = _shortage(solution, known)
+    weight = _weights(_size_covariance(solution, known)[1:, 1:]) if np.isfinite(short).all() else np.ones(len(known))
+    return scaled(solution, float(np.exp(weight @ short)))
 
 
 def adjusted_to(solution: SolvedViews, known: Sequence[KnownDistance]) -> SolvedViews:
@@ -65,25 +75,44 @@ def adjusted_to(solution: SolvedViews, known: Sequence[KnownDistance]) -> Solved
 
 def scale_spread(solution: SolvedViews, known: Sequence[KnownDistance]) -> float:
     """Relative standard deviation of the scale: of the distances, or of the heights where there are none."""
-    parameters, matched = solution.adjustment.parameters, solution.problem.correspondences
-    away = np.linalg.norm(
-        parameters.views[matched.view, CENTRE][:, :2] - parameters.points[matched.point][:, :2], axis=1
+    covariance = _size_covariance(solution, known)
+    if known:
+        weight = _weights(covariance[1:, 1:])
+        scatter = _shortage(solution, known).std(ddof=1) * np.linalg.norm(weight) if len(known) > 1 else 0.0
+        return float(max(np.sqrt(weight @ covariance[1:, 1:] @ weight), scatter))
+    matched, tall = solution.problem.correspondences, np.median(solution.adjustment.parameters.points[:, 2])
+    body = np.hypot(_MEAN_HEIGHT_SPREAD, _BODY_HEIGHT_SPREAD / np.sqrt(np.bincount(matched.frame).max())) / tall
+    return float(np.sqrt(body**2 + covariance[0, 0]))
+
+
+def _weights(covariance: Floats) -> Floats:
+    """Weights of the best unbiased mean, float64 (n,)."""
+    weight = np.linalg.solve(covariance, np.ones(len(covariance)))
+    return np.asarray(weight / weight.sum())
+
+
+def _size_covariance(solution: SolvedViews, known: Sequence[KnownDistance]) -> Floats:
+    """Covariance of the logarithms of the plan's size, by itself and over each distance, from cameras and pixels."""
+    problem, views = solution.problem, solution.adjustment.parameters.views
+    feet = [problem.correspondences.foot[problem.correspondences.view == view] for view in range(len(views))]
+    feet = [foot[even_rows(len(foot), _FEET)] for foot in feet]
+
+    def grounds(views: Floats) -> Floats:
+        sizes = [(int(width), int(height)) for width, height in problem.size]
+        places = [on_plane(view, size, foot, 0.0) for view, size, foot in zip(views, sizes, feet, strict=True)]
+        return np.nan_to_num(np.concatenate(places))
+
+    here = grounds(views) - grounds(views).mean(axis=0)
+
+    def logarithms(unknown: Floats) -> Floats:
+        changed, pixels = unknown[: views.size].reshape(views.shape), unknown[views.size :].reshape(-1, 2, 2)
+        size = np.log((grounds(changed) * here).sum() / (here**2).sum())
+        pairs = zip(known, pixels, strict=True)
+        return np.array([size, *(size - np.log(_measured(solution, changed, *pair)) for pair in pairs)])
+
+    pixels = [one.pixels for one in known]
+    slope = np.atleast_2d(approx_fprime(np.concatenate([views, *pixels], axis=None), logarithms, _STEP_SIZE))
+    covariance = block_diag(
+        solution.adjustment.covariance[: views.size, : views.size], _PIXEL_SPREAD**2 * np.eye(4 * len(known))
     )
-    rise = float(np.median(parameters.views[matched.view, CENTRE.start + 2] / away))
-    if not known:
-        tall, people = float(np.median(parameters.points[:, 2])), int(np.bincount(matched.frame).max())
-        body = np.hypot(_MEAN_HEIGHT_SPREAD, _BODY_HEIGHT_SPREAD / np.sqrt(people))
-        return float(np.hypot(body, _FORWARD_SPREAD * rise) / tall)
-    of_pixels = [_pixel_spread(solution, one) / one.metres for one in known]
-    off = np.log(measured(solution, known) / [one.metres for one in known])
-    scatter = off.std(ddof=1) if len(known) > 1 else 0.0
-    of_distances = max(float(np.sqrt(np.mean(np.square(of_pixels)))), scatter) / np.sqrt(len(known))
-    return float(np.hypot(of_distances, _FORWARD_SPREAD / np.median(away)))
-
-
-def _pixel_spread(solution: SolvedViews, known: KnownDistance) -> float:
-    """Standard deviation of a measured distance by its pixels, metres."""
-    steps = np.eye(4).reshape(4, 2, 2)
-    here = _measured(solution, known, known.pixels)
-    slope = [_measured(solution, known, known.pixels + step) - here for step in steps]
-    return _PIXEL_SPREAD * float(np.linalg.norm(slope))
+    return np.asarray(slope @ covariance @ slope.T)

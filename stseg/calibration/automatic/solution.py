@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.calibration.automatic.correspondence import Correspondences, match_endpoints
-from stseg.calibration.automatic.endpoints import Endpoints, even_rows, path_of
+from stseg.calibration.automatic.endpoints import Endpoints, even_rows
 from stseg.calibration.automatic.floor_features import Marks
 from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
 from stseg.calibration.automatic.view_alignment import ViewPaths
@@ -24,12 +24,16 @@ _HEIGHT_SPREAD = 0.08
 """Standard deviation of body height between people, metres."""
 _HEAD_SPREAD = 0.03
 """Standard deviation of the head height of one walking person, metres."""
-_MIN_SPREAD = np.array([[0.02, 0.02], [0.004, 0.003]])
+_MIN_SPREAD = np.array([[0.02, 0.01], [0.004, 0.01]])
 """Least standard deviations of feet and heads, along and across, in body lengths."""
+_MIN_FREEDOM = 0.1
+"""Share of a residual's variance below which it says nothing of its spread."""
 _MIN_PIXEL_SPREAD = 0.3
 """Least standard deviation of an endpoint, pixels."""
 _CLOCK_SPREAD, _SYNCHRONOUS_SPREAD = 0.2, 1e-4
 """Standard deviations of residual clock offsets, of unknown and of known delays, seconds."""
+_OWN_FRAME = 0.25
+"""Residual delay from which the next frame is tried, frames."""
 _MAX_MARKS = 800
 _MARK_PIXELS = 1.5
 """Standard deviation of a floor feature, pixels: it is located in a plan, where distant ground is stretched."""
@@ -75,11 +79,11 @@ def single_view_cameras(views: CalibrationInput, progress: Callable[[], None]) -
 
 
 def view_paths(views: CalibrationInput, single_cameras: Sequence[Floats]) -> list[ViewPaths]:
-    """Ground paths of each view's people, on its own ground."""
+    """Ground points of each view's people, on its own ground."""
     paths = []
     for endpoints, size, view in zip(views.endpoints, views.sizes, single_cameras, strict=True):
         place = axis_of_foot(view, size, endpoints.foot, FORWARD)
-        paths.append(ViewPaths(endpoints.frame, place[:, 0] + 1j * place[:, 1], path_of(endpoints, views.frame_rate)))
+        paths.append(ViewPaths(endpoints.frame, place[:, 0] + 1j * place[:, 1]))
     return paths
 
 
@@ -100,15 +104,34 @@ def refine_cameras(views: CalibrationInput, start: Floats, delay: Ints, progress
     parameters = BundleParameters(start, np.array([FORWARD, 0.0]), np.zeros((0, 3)))
     spread = np.array([[0.07, 0.05], [0.03, 0.03]])
     for gate in _GATES:
-        clock = parameters.views[:, CLOCK] - np.median(parameters.views[:, CLOCK])
-        delay_frames = np.rint(clock * views.frame_rate).astype(np.int64)
-        delay = delay + delay_frames - delay_frames[0]
-        parameters.views[:, CLOCK] -= delay_frames / views.frame_rate
         solution = _round(views, parameters, delay, gate, spread)
-        parameters = solution.adjustment.parameters
-        spread = _residual_spread(solution)
+        later = np.sign(_clock_frames(solution, views)) * np.ceil(np.abs(_clock_frames(solution, views)) - _OWN_FRAME)
+        if views.most_delay and later.any():
+            solution = _at_other_delay(views, solution, later.astype(np.int64), gate, spread)
+        delay, parameters, spread = solution.delay, solution.adjustment.parameters, _residual_spread(solution)
         progress()
-    return solution
+    return replace(solution, delay=delay - delay[0])
+
+
+def _clock_frames(solution: SolvedViews, views: CalibrationInput) -> Floats:
+    """Residual delay of each view against the others, frames."""
+    clock = solution.adjustment.parameters.views[:, CLOCK]
+    return np.asarray((clock - np.median(clock)) * views.frame_rate)
+
+
+def _at_other_delay(
+    views: CalibrationInput, solution: SolvedViews, later: Ints, gate: float, spread: Floats
+) -> SolvedViews:
+    """The round at delays so many frames later, where residual delays are smaller there.
+
+    They are estimated too small: people who are matched a frame apart meet half way.
+    """
+    parameters = solution.adjustment.parameters
+    clock = parameters.views.copy()
+    clock[:, CLOCK] -= later / views.frame_rate
+    other = _round(views, replace(parameters, views=clock), solution.delay + later, gate, spread)
+    before, after = (np.abs(_clock_frames(one, views)).sum() for one in (solution, other))
+    return other if after < before else solution
 
 
 def _round(
@@ -208,10 +231,13 @@ def _redundancy(matched: Correspondences, views: CalibrationInput) -> float:
 
 
 def _residual_spread(solution: SolvedViews) -> Floats:
-    """Robust standard deviation of feet and heads along and across, in body lengths.
+    """Robust standard deviation of feet and heads along and across, in body lengths, of studentised residuals.
 
-    The three parameters of each point reduce the residuals; the degrees of freedom correct for it.
+    Feet and heads have one spread across: a walker's head is not above the feet, and two views of either explain
+    themselves, so that the adjustment could believe one end alone.
     """
-    residual = solution.adjustment.residual
-    free = 1.0 - 3 * len(solution.adjustment.parameters.points) / max(4 * len(residual), 1)
-    return np.asarray(np.maximum(1.4826 * np.nanmedian(np.abs(residual), axis=0) / np.sqrt(free), _MIN_SPREAD))
+    adjustment = solution.adjustment
+    studentised = np.abs(adjustment.residual) / np.sqrt(np.maximum(adjustment.freedom, _MIN_FREEDOM))
+    spread = np.nanmedian(studentised, axis=0)
+    spread[:, 1] = np.nanmedian(studentised[..., 1])
+    return np.asarray(np.maximum(1.4826 * spread, _MIN_SPREAD))

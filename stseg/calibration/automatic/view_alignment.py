@@ -1,7 +1,7 @@
-"""Alignment of two views by rotation, shift and delay of their people's paths.
+"""Alignment of two views by rotation, shift and delay of their people's places.
 
-Identities and clock offsets are unknown: every path of one view is compared with every path of the other at every delay
-(all delays at once, by correlation), and the best hypotheses are verified on all people and frames.
+Identities and clock offsets are unknown: at every delay two people of one view are tried as two of the other, and the
+best hypotheses are verified on all people and frames.
 """
 
 from __future__ import annotations
@@ -13,16 +13,12 @@ import numpy as np
 
 from stseg.arrays import Complexes, Floats, Ints
 
-_MIN_OVERLAP, _MIN_SPREAD = 1.5, 0.4
-"""Least overlap of two paths, seconds, and least standard deviation of positions in it, metres."""
-_NOISE = 0.15
-"""Standard deviation between two views' positions of one person, metres."""
 _GATE = 0.7
 """Agreement gate, metres."""
 _BASELINE = 1.0
 """Least distance of the two points of a two-point hypothesis, metres."""
-_PATH_HYPOTHESES, _FRAME_HYPOTHESES = 60, 40
-"""Number of hypotheses of each kind that are verified."""
+_HYPOTHESES = 40
+"""Number of hypotheses that are verified."""
 _SAMPLES, _SCORED_PAIRS = 1500, 300
 """Two-point samples at each delay, and point pairs in their first scoring."""
 _ROUNDS = 4
@@ -31,14 +27,12 @@ _MAX_ALIGNMENTS = 5
 
 @dataclass(frozen=True)
 class ViewPaths:
-    """Ground paths of one view's people, on a ground of its own."""
+    """Ground points of one view's people, on a ground of its own."""
 
     frame: Ints
     """int64 (n,): frame of the stream."""
     place: Complexes
     """complex128 (n,): ground point x + iy, metres."""
-    path: Ints
-    """int64 (n,): path number."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +74,7 @@ def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> lis
     most_delay
         Largest delay, frames.
     """
-    tried = _from_paths(a, b, frame_rate, most_delay) + _from_frame_pairs(a, b, frame_rate, most_delay)
+    tried = _hypotheses(a, b, frame_rate, most_delay)
     judged = sorted((_refined(a, b, one) for one in tried), key=lambda one: -one.support)
     best: list[Alignment] = []
     for one in judged:
@@ -93,7 +87,7 @@ def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> lis
 
 def mirrored_paths(paths: ViewPaths) -> ViewPaths:
     """The paths mirrored."""
-    return ViewPaths(paths.frame, np.conj(paths.place), paths.path)
+    return ViewPaths(paths.frame, np.conj(paths.place))
 
 
 def _differ(one: Alignment, other: Alignment, frame_rate: float) -> bool:
@@ -102,23 +96,7 @@ def _differ(one: Alignment, other: Alignment, frame_rate: float) -> bool:
     return bool(turned or abs(one.delay - other.delay) > frame_rate or abs(one.shift - other.shift) > 1.5)
 
 
-def _from_paths(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
-    """Hypotheses from pairs of paths, the best gains first."""
-    least = max(4, round(_MIN_OVERLAP * frame_rate))
-    first = min(int(a.frame.min(initial=0)), int(b.frame.min(initial=0)))
-    span = max(int(a.frame.max(initial=0)), int(b.frame.max(initial=0))) - first + 1
-    size = 1 << int(np.ceil(np.log2(span + most_delay + 1)))
-    of_a, of_b = (_spectra(paths, first, size, least) for paths in (a, b))
-    delays = np.arange(-most_delay, most_delay + 1)
-    found: list[tuple[float, Alignment]] = []
-    for one in of_a:
-        for other in of_b:
-            found += _best_delays(one, other, delays, least)
-    found.sort(key=lambda pair: -pair[0])
-    return [alignment for _, alignment in found[:_PATH_HYPOTHESES]]
-
-
-def _from_frame_pairs(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
+def _hypotheses(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
     """Hypotheses from two point pairs, each at a time of its own, the best supported first.
 
     Delays are tried in steps of 0.3 s, within which no person leaves the gate.
@@ -128,7 +106,7 @@ def _from_frame_pairs(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay:
     found: list[Alignment] = []
     for delay in range(-(most_delay // step) * step, most_delay + 1, step):
         found += _at_delay(a, b, delay, rng)
-    return sorted(found, key=lambda one: -one.support)[:_FRAME_HYPOTHESES]
+    return sorted(found, key=lambda one: -one.support)[:_HYPOTHESES]
 
 
 def _at_delay(a: ViewPaths, b: ViewPaths, delay: int, rng: np.random.Generator) -> list[Alignment]:
@@ -149,47 +127,6 @@ def _at_delay(a: ViewPaths, b: ViewPaths, delay: int, rng: np.random.Generator) 
     support = np.maximum(0.0, 1 - (away / _GATE) ** 2).sum(axis=1) * len(x) / len(sample)
     best = np.argsort(-support)[:5]
     return [Alignment(delay, complex(factor[k]), complex(shift[k]), float(support[k])) for k in best]
-
-
-def _spectra(paths: ViewPaths, first: int, size: int, least: int) -> list[Complexes]:
-    """Fourier transforms of presence, position and squared position of each path, complex (3, size) each."""
-    spectra = []
-    for number in np.unique(paths.path):
-        rows = np.flatnonzero((paths.path == number) & np.isfinite(paths.place))
-        if len(rows) < least:
-            continue
-        signal = np.zeros((3, size), complex)
-        at = paths.frame[rows] - first
-        signal[0, at], signal[1, at], signal[2, at] = 1.0, paths.place[rows], np.abs(paths.place[rows]) ** 2
-        spectra.append(np.fft.fft(signal))
-    return spectra
-
-
-def _best_delays(a: Complexes, b: Complexes, delays: Ints, least: int) -> list[tuple[float, Alignment]]:
-    """Gain and alignment at the few best delays of two paths (Procrustes solution at every delay)."""
-
-    def over(x: Complexes, y: Complexes) -> Complexes:
-        return np.asarray(np.fft.ifft(np.conj(x) * y)[delays])  # sum over t of conj(x(t)) y(t + delay)
-
-    n = np.rint(over(a[0], b[0]).real)
-    enough = n >= least
-    n = np.maximum(n, 1)
-    sum_a, sum_b = np.conj(over(a[1], b[0])), over(a[0], b[1])
-    var_a = over(a[2], b[0]).real / n - np.abs(sum_a / n) ** 2
-    var_b = over(a[0], b[2]).real / n - np.abs(sum_b / n) ** 2
-    both = over(a[1], b[1]) / n - np.conj(sum_a / n) * (sum_b / n)
-    enough &= (var_a > _MIN_SPREAD**2) & (var_b > _MIN_SPREAD**2)
-    if not enough.any():
-        return []
-    remainder = np.maximum(var_a + var_b - 2 * np.abs(both), 0.0)
-    gain = np.where(enough, n * np.log((var_a + var_b + _NOISE**2) / (remainder + _NOISE**2)), -np.inf)
-    found = []
-    for k in np.argsort(-gain)[:3]:
-        if np.isfinite(gain[k]):
-            factor = both[k] / np.abs(both[k])
-            shift = (sum_b[k] - factor * sum_a[k]) / n[k]
-            found.append((float(gain[k]), Alignment(int(delays[k]), complex(factor), complex(shift), 0.0)))
-    return found
 
 
 def _refined(a: ViewPaths, b: ViewPaths, one: Alignment) -> Alignment:

@@ -11,7 +11,6 @@ from cyclopts import Parameter
 from stseg.commands.calibrate.scene import numbers
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
-from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.tasks.calibration import automatic
 from stseg.tasks.calibration.automatic import AutomaticCalibration, Distance, camera_names
@@ -118,7 +117,5 @@ def _print(found: AutomaticCalibration, person_height: float, distances: Sequenc
 def _distance(text: str, names: Sequence[str]) -> Distance:
     camera, _, rest = text.partition(",")
     expected = f"camera,u,v,u,v,metres with a camera of {', '.join(names)}"
-    if camera not in names:
-        raise ConfigError("--distance", "", repr(text), expected)
     u0, v0, u1, v1, metres = numbers("--distance", rest, expected, 5)
     return camera, u0, v0, u1, v1, metres
