@@ -202,6 +202,7 @@ class TestCommand:
         refused(ConfigError, r"--frames: found '9'", run, "check", str(rig_file), "--frames=9")
 
 
+@pytest.mark.slow
 def test_a_real_rig_is_right_until_a_camera_is_moved(tmp_path: Path) -> None:
     folder, path = data_path("uu4").resolve(), tmp_path / "real.toml"
     names = sorted(str(path) for path in folder.glob("cam?/config.xml"))

@@ -119,6 +119,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
             process.wait()
 
 
+@pytest.mark.slow
 def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
     rig_path: Path, undisturbed: Path, tmp_path: Path, cluster: Cluster
 ) -> None:

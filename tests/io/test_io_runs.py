@@ -28,6 +28,7 @@ from run_files import (
     small_volume,
     table_of,
     trajectory_of,
+    write_empty_run,
     write_small_run,
 )
 
@@ -238,7 +239,7 @@ def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: py
     def write(trace: "TraceFunction | None") -> None:
         sys.settrace(trace)
         try:
-            write_small_run(tmp_path / "night.h5", overwrite=True)
+            write_empty_run(tmp_path / "night.h5")
         finally:
             sys.settrace(None)
             assert not parts_of(tmp_path / "night.h5"), reached[-1:]

@@ -154,6 +154,7 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_page_of_an_hour_stays_below_30_megabytes(hour: Path, tmp_path: Path) -> None:
     assert len(read_run(hour).frames) == 54_000
     report(hour, output=tmp_path / "hour.html")
