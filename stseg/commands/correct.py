@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.terminal.standard_error import frame_bar
 from stseg.tasks import correction
 
 
@@ -45,6 +46,7 @@ def correct(
     overwrite
         Replace the file if it exists.
     """
-    found = correction.correct(run_file, answers, output, overwrite=overwrite)
+    with frame_bar("correcting", None):
+        found = correction.correct(run_file, answers, output, overwrite=overwrite)
     changed = sum(answer.action != "keep" for answer in found.answers)
     print(f"wrote {output}: {len(found.answers)} answers, {changed} changes; {len(found.run.tracks)} tracks")

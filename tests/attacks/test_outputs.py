@@ -1,6 +1,7 @@
 """Outputs replace neither inputs nor what stseg did not make: every command, with each of its files as its output."""
 
 import os
+import sys
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -126,3 +127,23 @@ def filled(database: object) -> dict[str, int]:
     """Tables that should hold a row."""
     database.execute("CREATE TABLE recordings (recording TEXT)")  # type: ignore[attr-defined]
     return {"recordings": 1}
+
+
+@pytest.mark.parametrize(
+    ("words", "work"),
+    [
+        ("evaluate tracks.csv tracks.csv", "scoring"),
+        ("export run.h5 --to csv -o out.csv", "writing"),
+        ("measure run.h5 -o measures", "measuring"),
+        ("review run.h5 -o review.html", "searching"),
+        ("correct run.h5 answers.csv -o corrected.h5", "correcting"),
+        ("report run.h5 -o page.html", "drawing"),
+    ],
+)
+def test_work_shows_on_a_terminal(
+    folder: Path, words: str, work: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "tracks.csv").write_text("frame,id,x,y\n11,1,0.2,0.2\n")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    main(words.split())
+    assert work in capsys.readouterr().err
