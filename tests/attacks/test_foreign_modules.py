@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from arrivals import arrive, write_pieces
+from cluster import started_cluster
 from recordings import ENVIRONMENT, OPTIONS, compiled_only, write_recording
 
 LIBRARIES = ("numpy", "scipy", "h5py", "cv2", "numba", "cyclopts", "rich", "PIL", "maxflow", "yaml", "duckdb", "stseg")
@@ -57,6 +58,8 @@ def succeeds(folder: Path, *arguments: object) -> None:
 @compiled_only
 def test_no_command_runs_what_lies_beside_the_recording(folder: Path) -> None:
     succeeds(folder, "run", "rig.toml", "-o", "run.h5", "--workers", 2, *OPTIONS)
+    with started_cluster(folder.parent, folder) as cluster:
+        succeeds(folder, "run", "rig.toml", "-o", "cluster.h5", "--scheduler", cluster.address, *OPTIONS)
     succeeds(folder, "inspect", "run.h5")
     succeeds(folder, "export", "run.h5", "--to", "csv", "-o", "out.csv")
     succeeds(folder, "export", "run.h5", "--to", "movement", "-o", "out.nc")

@@ -1,22 +1,19 @@
 """Workers: the same bits on any number of them, and processes that end."""
 
 import os
-import re
 import signal
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing import active_children
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import distributed
 import pytest
+from cluster import Cluster, started_cluster
 from recordings import ENVIRONMENT, FRAMES, assert_same, compiled_only, run_words, track, write_recording
 from refusals import Command
 from scenes import corner_cameras, rig_of
@@ -86,37 +83,11 @@ def test_no_workers_are_refused(rig_path: Path, tmp_path: Path, refusal: Command
     assert "--workers: found 0" in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "0"))
 
 
-class Cluster(NamedTuple):
-    """A scheduler and its worker processes."""
-
-    address: str
-    workers: list[subprocess.Popen[bytes]]
-
-
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[Cluster]:
     """With two workers."""
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1"]
-    command += ["--port", "0", "--no-dashboard"]
-    log = tmp_path / "scheduler.log"
-    with log.open("w") as file:
-        started = [subprocess.Popen(command, stderr=file, stdout=file, env=ENVIRONMENT)]
-    try:
-        deadline = time.monotonic() + 60
-        while not (found := re.search(r"tcp://127\.0\.0\.1:\d+", log.read_text())):
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
-        command = [sys.executable, "-m", "distributed.cli.dask_worker", found[0], "--host", "127.0.0.1"]
-        command += ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory"]
-        quiet, folders = subprocess.DEVNULL, [str(tmp_path / f"worker{k}") for k in range(2)]
-        started += [
-            subprocess.Popen([*command, folder], stderr=quiet, stdout=quiet, env=ENVIRONMENT) for folder in folders
-        ]
-        yield Cluster(found[0], started[1:])
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
+    with started_cluster(tmp_path) as found:
+        yield found
 
 
 @pytest.mark.slow
