@@ -35,9 +35,8 @@ def path_for_children(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
 
 
-@pytest.mark.parametrize("workers", [2, 4])
-def test_any_number_of_workers_makes_the_same(rig_path: Path, undisturbed: Path, tmp_path: Path, workers: int) -> None:
-    assert track(rig_path, tmp_path / "run.h5", "--workers", str(workers)) == 0
+def test_any_number_of_workers_makes_the_same(rig_path: Path, undisturbed: Path, tmp_path: Path) -> None:
+    assert track(rig_path, tmp_path / "run.h5", "--workers", "4") == 0  # two are those of which one is killed, below
     assert_same(tmp_path / "run.h5", undisturbed)
     assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
 
