@@ -118,17 +118,16 @@ def _occupants(
     """
     occupied_by = np.zeros((int(component.max()) + 1, len(predicted.track)), bool)
     displaced = np.zeros_like(predicted.expected)
-    volume = np.full(occupied.shape, -1, np.int64)
-    volume.flat[subgraph.cell] = component
-    cell_ground = places.ground
     for t, (ground, track) in enumerate(zip(detections.ground, detections.track, strict=True)):
         rows, columns = np.nonzero(occupied[t].any(0))
-        cells_ground = cell_ground[rows, columns]
+        cells_ground = places.ground[rows, columns]
         for detection_ground, k in zip(ground, np.searchsorted(predicted.track, track), strict=True):
             distance = np.hypot(*(cells_ground - detection_ground).T)
             if distance.min(initial=np.inf) > reach / 2:
                 displaced[t, k] = True
                 continue
-            above = volume[t, :, rows[distance.argmin()], columns[distance.argmin()]]
-            occupied_by[above[above >= 0], k] = True
+            row, column = rows[distance.argmin()], columns[distance.argmin()]
+            planes = np.flatnonzero(occupied[t, :, row, column])
+            above = np.ravel_multi_index((t, planes, row, column), occupied.shape)
+            occupied_by[component[np.searchsorted(subgraph.cell, above)], k] = True
     return occupied_by, displaced
