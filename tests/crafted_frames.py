@@ -8,7 +8,7 @@ import reference_core as reference
 
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters
-from stseg.detection.score.scoring import set_score
+from stseg.detection.score.moves import fill_gains
 from stseg.detection.search.best_set import ENUMERATION_LIMIT, GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import COMPILED
 
@@ -32,18 +32,16 @@ class CraftedFrame:
 
     def problem(self) -> DetectionProblem:
         """The frame as the kernels read it."""
-        views, area = len(self.boxes.boxes) + len(self.pixels.raster), self.pixels.raster[0].size
         return DetectionProblem(
             self.boxes, self.pixels, self.size_prior, self.birth_cost, self.track_gain, self.ground, self.breadth,
-            PARAMETERS, np.empty(max(area, self.boxes.match.shape[2]), np.int64),
-            np.empty(self.track_gain.shape[1], np.int64), np.full((len(self.pixels.raster), area), -1, np.int16),
-            np.zeros((views, len(self.size_prior) + 1)),
+            PARAMETERS, np.full((len(self.pixels.raster), self.pixels.raster[0].size), -1, np.int16),
         )  # fmt: skip
 
     def score(self, members: Sequence[int] | Ints) -> float:
         """Score of a set by the kernels."""
+        none, nothing = np.zeros(0, np.int64), np.zeros((0, 0))
         chosen = np.array(members, np.int64)
-        return set_score(chosen, len(chosen), self.problem())
+        return fill_gains(chosen, none, self.problem(), np.zeros(0), nothing, nothing.astype(int), none)
 
     def best_set(
         self,
@@ -74,7 +72,7 @@ def random_frame(seed: int, candidates: int, tracks: int = 0) -> CraftedFrame:
     cover = rng.uniform(0, 1, (views, candidates, candidates)) * (rng.random((views, candidates, candidates)) < 0.3)
     cover[:, np.arange(candidates), np.arange(candidates)] = 0
     inside = rng.uniform(0.3, 1, (views, candidates))
-    boxes = BoxEvidence(match, np.array([most, 2]), hiders_of_cover(cover), inside, np.ones(candidates))
+    boxes = BoxEvidence(match, np.array([most, 2]), hiders_of_cover(cover), inside)
     start = rng.integers(0, columns - 2, (views, candidates, 4))
     stop = np.minimum(start + rng.integers(0, 6, start.shape), columns)
     first = rng.integers(-1, rows - 1, (views, candidates))

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Singles
+from stseg.arrays import Floats, Singles
 from stseg.bodies.views import BoxView, PixelView, ViewObservation
 from stseg.detection.evidence.blob_scale import blob_scales
 from stseg.detection.evidence.box_lattice import BoxLattice
@@ -62,12 +62,6 @@ class FrameEvidence:
         """Scales of their pixels (`stseg.detection.evidence.blob_scale`)."""
         return blob_scales(self.rasters, self.extremes, self.lattice, self.prior.config, self.prior.body)
 
-    @cached_property
-    def _assignment(self) -> Ints:
-        """Scratch of scores; see `DetectionProblem`."""
-        boxes = max((len(o.edges) for o in self.observations if o), default=0)
-        return np.empty(max(self.rasters[:1].size, boxes, 1), np.int64)
-
     def problem(self, pool: Candidates, bodies: ProjectedBodies, base: DetectionProblem | None) -> DetectionProblem:
         """The candidates of a pool as the kernels read them; `base` is the problem of the first ones, if there is one.
 
@@ -95,8 +89,5 @@ class FrameEvidence:
             ground=pool.ground,
             breadth=breadth,
             parameters=self.parameters,
-            assignment=self._assignment,
-            track_member=np.empty(len(prior.predicted), np.int64),
             owner=self.lattice.owner,
-            view_evidence=np.zeros((len(self.views), len(pool) + 1)),
         )

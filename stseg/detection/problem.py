@@ -86,8 +86,6 @@ class BoxEvidence(NamedTuple):
     view * candidates + candidate."""
     inside: Floats
     """float64 (view, candidate): share of the candidate's pillar inside the image."""
-    visible_past: Floats
-    """float64 (candidate,): scratch, 1 before and after: the share of one candidate that each other leaves visible."""
 
 
 class PixelEvidence(NamedTuple):
@@ -142,15 +140,6 @@ class DetectionProblem(NamedTuple):
     without pixels."""
     parameters: ScoreParameters
     """Constants of the score."""
-    assignment: Ints
-    """int64 (at least boxes, at least v * u): scratch: after a view was scored, the place in the set of the member that
-    each box or pixel is assigned to, -1 for none."""
-    track_member: Ints
-    """int64 (at least tracks,): scratch: after a set was scored, the place in it of the member who continues each
-    track, -1 for none."""
     owner: PixelAssignment
     """int16 (view, v * u): scratch, -1 before and after: the candidate that each pixel is assigned to while sets are
     searched."""
-    view_evidence: Floats
-    """float64 (view, candidate + 1): scratch: after a set was scored, the evidence of each view for each of its
-    members, nats; views with boxes first."""

@@ -77,9 +77,7 @@ def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     blind = np.array([False, True, False])
     before = hiders_of(views[:, :base].copy(), away[:, :base].copy(), sizes, blind, no_rows(), 0)
     hiders = hiders_of(views, away, sizes, blind, before, base)
-    left = reference.left_by_all(
-        BoxEvidence(np.empty(0), np.zeros(0, np.int64), hiders, np.empty((3, len(bodies))), inside)
-    )
+    left = reference.left_by_all(BoxEvidence(np.empty(0), np.zeros(0, np.int64), hiders, np.empty((3, len(bodies)))))
     np.testing.assert_allclose(inside, [reference.inside(b, WIDTH, HEIGHT) for b in bodies], atol=1e-12)
     hidden = [[reference.cover(bodies, distance, WIDTH, HEIGHT, i, k) for k in everyone] for i in everyone]
     none_hidden = np.zeros_like(hidden)

@@ -337,7 +337,7 @@ def test_no_set_becomes_less_likely(seed: int) -> None:
 
 def box_tables(estimate: MapEstimate) -> list[Floats | Ints]:
     boxes = estimate.problem.boxes
-    return [boxes.match, boxes.boxes, *boxes.hiders, boxes.inside, boxes.visible_past]
+    return [boxes.match, boxes.boxes, *boxes.hiders, boxes.inside]
 
 
 @pytest.mark.parametrize("seed", range(3))

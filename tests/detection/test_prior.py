@@ -15,7 +15,6 @@ from strategies import numbers
 from stseg.arrays import Floats
 from stseg.config import BodyConfig, DetectionConfig
 from stseg.detection.prior import Prior
-from stseg.detection.score.scoring import track_score
 from stseg.geometry import Grid, Rig
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
@@ -79,21 +78,6 @@ def test_no_tracks() -> None:
     assert no_tracks().track_log_ratio(np.zeros((3, 2)), np.full(3, 1.7), BODY, CONFIG.prior_log_odds).shape == (3, 0)
     assert no_tracks().track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 0)
     assert expecting((0, 0)).track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 1)
-
-
-@given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 999))
-def test_tracks_are_assigned_at_the_greatest_sum(people: int, tracks: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    candidates = people + 2
-    log_ratio, birth = rng.normal(-2, 4, (candidates, tracks)), rng.uniform(0, 5, candidates)
-    members = rng.permutation(candidates)[:people]
-    member_of = np.full(tracks + 2, 77)
-    total = track_score(members, people, log_ratio, birth, member_of)
-    gain = (birth[:, None] + log_ratio)[members].reshape(people, tracks)
-    pairs = reference.best_pairs(gain)
-    assert total == pytest.approx(sum(gain[pair] for pair in pairs))
-    place = {k: a for a, k in pairs}
-    assert member_of.tolist() == [*(place.get(k, -1) for k in range(tracks)), 77, 77]
 
 
 def open_ground(grid: Grid) -> Rig:

@@ -6,11 +6,10 @@ import reference_core as reference
 from crafted_frames import PARAMETERS, CraftedFrame, in_rooms, random_frame, scaled
 from scipy.optimize import linear_sum_assignment
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 from stseg.bodies.outlines import paint_outlines
 from stseg.detection.score.gains import gain
 from stseg.detection.score.moves import add, fill_gains, put, release, remove, return_to, withdraw
-from stseg.detection.score.scoring import box_score, fill_box_assignment, fill_set_score, pixel_score, set_score
 from stseg.detection.score.set_state import Kept, SetState, set_state
 from stseg.detection.score.track_state import assign_track, release_track, track_gain, track_state
 from stseg.kernels.accelerate import kernel
@@ -28,57 +27,53 @@ def test_score_by_definition(seed: int, tracks: int) -> None:
         assert frame.score(members) == pytest.approx(expected, abs=1e-5)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_a_score_has_its_evidence_and_tracks(seed: int) -> None:
-    frame, members = scaled(random_frame(seed, 6, 3)), np.array([5, 3, 0])
-    evidence, tracks, problem = np.empty((4, 3)), np.empty(3, np.int64), frame.problem()
-    assert fill_set_score(members, frame.problem(), evidence, tracks) == set_score(members, 3, problem)
-    np.testing.assert_array_equal(evidence, problem.view_evidence[:, :3])
-    gains = frame.birth_cost[members, None] + frame.track_gain[members]
-    pairs = [(a, track) for a, track in enumerate(tracks) if track >= 0]
-    assert sum(gains[pair] for pair in pairs) == pytest.approx(sum(gains[pair] for pair in reference.best_pairs(gains)))
+def additions(frame: CraftedFrame, members: Ints, candidates: Ints) -> tuple[Floats, Floats, Ints, Ints]:
+    """Gains, evidence, boxes and tracks of candidates in the set of the members."""
+    number = len(candidates)
+    gains, evidence, boxes = np.empty(number), np.empty((4, number)), np.full((4, number), -1)
+    fill_gains(members, candidates, frame.problem(), gains, evidence, boxes, tracks := np.empty(number, np.int64))
+    return gains, evidence, boxes, tracks
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_candidates_add_what_larger_sets_score_more(seed: int) -> None:
+    """Each has the evidence, box and track that it has as a member."""
     frame, members, candidates = scaled(random_frame(seed, 8, 3)), np.array([5, 3, 0]), np.arange(8)
-    gains, evidence, tracks = np.empty(8), np.empty((4, 8)), np.empty(8, np.int64)
-    fill_gains(members, candidates, frame.problem(), gains, evidence, tracks)
+    gains, *found = additions(frame, members, candidates)
     for i in candidates:
         others = members[members != i]
         larger, before = np.append(others, i), frame.score(others)
         assert gains[i] == pytest.approx(frame.score(larger) - before, abs=1e-9)
-        if i not in members:
-            expected, expected_tracks = np.empty((4, 4)), np.empty(4, np.int64)
-            fill_set_score(larger, frame.problem(), expected, expected_tracks)
-            np.testing.assert_allclose(evidence[:, i], expected[:, -1], atol=1e-12)
-            assert tracks[i] == expected_tracks[-1]
+        for of_each, expected in zip(found, additions(frame, larger, larger)[1:], strict=True):
+            np.testing.assert_allclose(of_each[..., i], expected[..., -1], atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_boxes_of_all_views_are_assigned_as_of_each(seed: int) -> None:
-    frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
-    boxes = np.empty((2, 4), np.int64)
-    fill_box_assignment(members, frame.problem(), boxes)
-    for view in range(2):
-        member_of = np.full(4, -1)
-        box_score(view, members, 3, frame.boxes, PARAMETERS, member_of, np.empty(3))
-        np.testing.assert_array_equal(boxes[view], member_of)
-    assert (boxes >= 0).any()
+def test_members_have_tracks_and_boxes_of_their_own(seed: int) -> None:
+    frame, members = scaled(random_frame(seed, 6, 3)), np.array([5, 3, 0, 1])
+    _, evidence, boxes, tracks = additions(frame, members, members)
+    gains = frame.birth_cost[members, None] + frame.track_gain[members]
+    pairs = [(a, track) for a, track in enumerate(tracks) if track >= 0]
+    assert sum(gains[pair] for pair in pairs) == pytest.approx(sum(gains[pair] for pair in reference.best_pairs(gains)))
+    assert (boxes[:2] >= 0).any()
+    for view, own in enumerate(boxes[:2]):
+        match = frame.boxes.match[view, members, own]
+        np.testing.assert_allclose(evidence[view][own >= 0], PARAMETERS.box_log_ratio + match[own >= 0])
+        assert len(set(own[own >= 0])) == (own >= 0).sum()
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_painted_pixels_are_those_of_the_score(seed: int) -> None:
+def test_painted_pixels_are_those_of_the_nearest(seed: int) -> None:
     frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
     pixels = frame.pixels
     for view in range(len(pixels.raster)):
-        owner, parts = np.full(pixels.raster[view].size, -1), np.empty(3)
-        pixel_score(view, members, 3, pixels, PARAMETERS, owner, parts)
-        painted = np.full(pixels.raster[view].shape, -1, np.int16)
+        painted, nearest = np.full((2, *pixels.raster[view].shape), -1, np.int16)
         farthest_first = np.argsort(pixels.distance[view][members], kind="stable")[::-1].copy()
         paint_outlines(farthest_first, pixels.first[view][members], pixels.spans[view][members], painted)
+        for a in farthest_first:
+            nearest[reference.covered(pixels, view, members[a])] = a
         assert (painted >= 0).any()
-        np.testing.assert_array_equal(painted.ravel(), owner)
+        np.testing.assert_array_equal(painted, nearest)
 
 
 def assert_nearest_own_pixels(state: SetState) -> None:

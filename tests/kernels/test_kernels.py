@@ -24,18 +24,17 @@ PROGRAM = """
 import sys
 import numpy as np
 from stseg.kernels.accelerate import compilation_noted
-from stseg.detection.score.scoring import track_score
+from stseg.geometry.summed_area import fill_summed_area
 with compilation_noted(print):
-    gain, taken = np.array([[3.0, 2.0], [2.9, 0.0]]), np.empty(2, np.int64)
-    print(track_score(np.arange(2), 2, gain, np.zeros(2), taken), *taken)
+    print(fill_summed_area(np.array([[0.4, 0.2]], np.float32), 0, 0, sums := np.empty((2, 3), np.uint32)), *sums[1])
 print("numba.cpython.unicode" in sys.modules)
 """
 """Prints notes, the result of a kernel that calls another kernel, and whether what compiling needs was imported."""
 AHEAD = """
 from stseg.kernels.accelerate import load_cached_kernels
-from stseg.detection.score.scoring import track_score
+from stseg.geometry.summed_area import fill_summed_area
 load_cached_kernels()
-print(len(track_score.signatures))
+print(len(fill_summed_area.signatures))
 """
 """Prints how many forms of a kernel were taken from the cache before it was called."""
 
@@ -84,10 +83,10 @@ def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
         process(program, NUMBA_CACHE_DIR=str(tmp_path)).stdout.splitlines()
         for program in (AHEAD, PROGRAM, PROGRAM, AHEAD)
     )
-    assert first == ["compiling kernels, once on this machine, about a minute of work", "4.9 1 0", "True"]
-    assert second == ["4.9 1 0", "False"]
+    assert first == ["compiling kernels, once on this machine, about a minute of work", "819 0 1638 2457", "True"]
+    assert second == ["819 0 1638 2457", "False"]
     assert (empty, ahead) == (["0"], ["1"])
-    assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")} == {"scoring.track_score"}
+    assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")} == {"summed_area.fill_summed_area"}
 
 
 @COMPILED
@@ -97,7 +96,7 @@ def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
     printed = [running.communicate()[0].splitlines() for running in both]
     assert sorted(len(lines) for lines in printed) == [2, 3]
     assert sum("compiling" in lines[0] for lines in printed) == 1
-    assert [lines[-2] for lines in printed] == ["4.9 1 0", "4.9 1 0"]
+    assert [lines[-2] for lines in printed] == ["819 0 1638 2457", "819 0 1638 2457"]
 
 
 @pytest.fixture(scope="module")
@@ -145,8 +144,8 @@ def test_files_of_the_cache_are_used_as_this_user_wrote_them(
     for file in tmp_path.rglob(f"*.{files}"):
         damaged(file, kind)
     anew, known = (process(PROGRAM, cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
-    assert anew.stdout.splitlines()[1:] == ["4.9 1 0", "True"] and not anew.stderr
-    assert known.stdout.splitlines() == ["4.9 1 0", "False"] and not known.stderr
+    assert anew.stdout.splitlines()[1:] == ["819 0 1638 2457", "True"] and not anew.stderr
+    assert known.stdout.splitlines() == ["819 0 1638 2457", "False"] and not known.stderr
     assert not (tmp_path / "executed").exists()
 
 
@@ -155,7 +154,7 @@ def test_files_of_the_cache_are_used_as_this_user_wrote_them(
 def test_kernels_need_no_room_on_the_disk(tmp_path: Path) -> None:
     full = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n{PROGRAM}"
     ended = process(full, NUMBA_CACHE_DIR=str(tmp_path), PYTHONDONTWRITEBYTECODE="1")
-    assert ended.stdout.splitlines()[1:] == ["4.9 1 0", "True"] and not ended.stderr
+    assert ended.stdout.splitlines()[1:] == ["819 0 1638 2457", "True"] and not ended.stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no locks of folders")

@@ -95,13 +95,12 @@ def box_evidence(
             fill_inside(edges, width, height, inside[k, first:])
     is_blind = np.array([observation is None for _, observation in chosen], bool)
     hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, base.hiders if base else no_rows(), first)
-    return BoxEvidence(match, boxes, hiders, inside, np.ones(candidates))
+    return BoxEvidence(match, boxes, hiders, inside)
 
 
 def _no_boxes(candidates: int) -> BoxEvidence:
     """Evidence where no view delivers boxes."""
-    nothing = np.zeros((0, candidates))
-    return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_rows(), nothing, np.ones(candidates))
+    return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_rows(), np.zeros((0, candidates)))
 
 
 def stacked_rasters(views: Sequence[View], of_views: Sequence[Singles | None]) -> Singles:

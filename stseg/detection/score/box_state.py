@@ -24,6 +24,8 @@ class BoxPairs(NamedTuple):
     box: Ints
     own_gain: Floats
     """float64 (candidate,): the gain of the box that each of the last linked members is assigned, 0 for none, nats."""
+    own_box: Ints
+    """int64 (candidate,): that box, -1 for none."""
     has_member: Flags
 
 
@@ -79,7 +81,7 @@ def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
     most = len(fits.item) + 1
     pairs = BoxPairs(
         np.empty(most), np.empty(most, np.int64), np.empty(most, np.int64),
-        np.zeros(candidates), np.zeros(boxes, np.bool_),
+        np.zeros(candidates), np.empty(candidates, np.int64), np.zeros(boxes, np.bool_),
     )  # fmt: skip
     return BoxState(
         views, boxes, fits, fitting, _hidden_by(evidence.hiders, views, candidates), evidence.hiders,
@@ -174,7 +176,7 @@ def _score_of_linked(
         row = view * candidates + state.linked[a]
         missing = _missing_cost(row, inside, state, parameters)
         total += missing
-        pairs.own_gain[state.linked[a]] = 0.0
+        pairs.own_gain[state.linked[a]], pairs.own_box[state.linked[a]] = 0.0, -1
         for k in range(fits.start[row], fits.start[row + 1]):
             if fits.value[k] > missing:
                 pairs.gain[count], pairs.member[count] = fits.value[k] - missing, state.linked[a]
@@ -205,7 +207,8 @@ def _assigned_gain(count: int, pairs: BoxPairs) -> float:
                 best, gain = k, pairs.gain[k]
         if best < 0:
             break
-        pairs.own_gain[pairs.member[best]], pairs.has_member[pairs.box[best]] = gain, True
+        pairs.own_gain[pairs.member[best]], pairs.own_box[pairs.member[best]] = gain, pairs.box[best]
+        pairs.has_member[pairs.box[best]] = True
         total += gain
     for k in range(count):
         pairs.has_member[pairs.box[k]] = False

@@ -1,11 +1,11 @@
-"""Gains of candidates: the change of the score with one more member, or without one (`scoring.set_score`).
+"""Gains of candidates: the change of the score with one more member, or without one (`scoring`).
 
 Gains are kept, view by view, until a member comes or goes that they depend on.
 """
 
 from __future__ import annotations
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 from stseg.detection.score.box_state import box_gain, box_part
 from stseg.detection.score.pixel_state import assign_in_view, overlaps, pixel_gain, pixel_part, reassign_pixels
 from stseg.detection.score.set_state import SetState
@@ -68,14 +68,16 @@ def gain(i: int, absent: int, state: SetState) -> float:
 
 
 @kernel
-def fill_evidence(i: int, state: SetState, parts: Floats) -> int:
-    """Fill parts (view,) with the evidence of each view for candidate i as a further member, nats; returns its track.
+def fill_evidence(i: int, state: SetState, parts: Floats, box: Ints) -> int:
+    """Fill parts and box (view,) of candidate i as a further member: evidence, nats, and its box, -1 for none.
 
-    That is the number of a predicted track, -1 for a birth. Views with boxes come first.
+    Views with boxes come first; box is filled for these alone. Returns the predicted track that it continues, -1 for a
+    birth.
     """
     boxes, parameters = state.boxes, state.problem.parameters
     for view in range(boxes.views):
         parts[view] = box_part(view, i, state.inside, boxes, parameters)
+        box[view] = boxes.pairs.own_box[i]
     for view in range(len(state.pixels.evidence.raster)):
         parts[boxes.views + view] = parameters.effective_observations * pixel_part(view, i, state.pixels)
     return track_after(i, state.tracks)

@@ -124,25 +124,33 @@ def release(state: SetState) -> None:
 
 @kernel
 def fill_gains(
-    members: Ints, candidates: Ints, problem: DetectionProblem, gains: Floats, view_evidence: Floats, tracks: Ints
-) -> None:
+    members: Ints, candidates: Ints, problem: DetectionProblem, gains: Floats, view_evidence: Floats, boxes: Ints,
+    tracks: Ints,
+) -> float:  # fmt: skip
     """Fill gains (k,) with those of some candidates, int64 (k,), in the set of the members, int64 (n,): nats.
 
-    Of candidates outside it, `view_evidence` float64 (view, k) and `tracks` int64 (k,) are filled, too: what
-    `fill_evidence` says of each.
+    Filled with what `fill_evidence` says of each, of members beside the others, are `view_evidence` float64 (view, k),
+    boxes int64 (view, k) and tracks int64 (k,). Returns the score of the members.
     """
-    _fill_gains(members, candidates, set_state(problem), gains, view_evidence, tracks)
+    return _fill_gains(members, candidates, set_state(problem), gains, view_evidence, boxes, tracks)
 
 
 @kernel
 def _fill_gains(
-    members: Ints, candidates: Ints, whole: SetState, gains: Floats, view_evidence: Floats, tracks: Ints
-) -> None:
+    members: Ints, candidates: Ints, whole: SetState, gains: Floats, view_evidence: Floats, boxes: Ints, tracks: Ints
+) -> float:
     state = pointed(whole)
     for i in members:
-        put(i, state.size[0], state)
+        add(i, state.size[0], state)
     for k in range(len(candidates)):
-        gains[k] = gain(candidates[k], -1, state)
-        if not state.inside[candidates[k]]:
-            tracks[k] = fill_evidence(candidates[k], state, view_evidence[:, k])
+        i, place, is_member = candidates[k], 0, state.inside[candidates[k]]
+        gains[k] = gain(i, -1, state)
+        while is_member and state.members[place] != i:
+            place += 1
+        if is_member:
+            withdraw(place, state)
+        tracks[k] = fill_evidence(i, state, view_evidence[:, k], boxes[:, k])
+        if is_member:
+            put(i, place, state)
     release(state)
+    return float(state.total[0])

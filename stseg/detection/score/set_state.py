@@ -1,6 +1,6 @@
 """A set of candidates with the assignment of its evidence: gains of single moves without scoring the set anew.
 
-The gain of a candidate is the difference of two scores (`scoring.set_score`). One more member changes the assignment of
+The gain of a candidate is the difference of two scores (`scoring`). One more member changes the assignment of
 pixels only inside its outline (`pixel_state`), that of boxes only among the members linked to it (`box_state`), and
 that of tracks along one path (`track_state`): with the set's assignment at hand, the gain is a sum over these alone.
 """

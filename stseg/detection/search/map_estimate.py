@@ -18,34 +18,25 @@ from stseg.detection.evidence.candidate_evidence import ProjectedBodies
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.moves import fill_gains
-from stseg.detection.score.scoring import fill_box_assignment, fill_set_score
 from stseg.detection.search.best_set import GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
 
 
 @dataclass(frozen=True)
-class SetScore:
-    """Score of a set of candidates."""
+class Additions:
+    """Candidates, each as a further member of a set; members of it, each beside the others."""
 
     total: float
-    """Nats."""
-    view_evidence: Floats
-    """float64 (view, member): evidence of each view for each member, nats."""
-    track_index: Ints
-    """int64 (member,): the predicted track that each member continues, -1 for births."""
-
-
-@dataclass(frozen=True)
-class Additions:
-    """Candidates, each as a further member of a set."""
-
+    """Score of the set, nats."""
     gain: Floats
     """float64 (m,): change of the score, nats."""
     view_evidence: Floats
     """float64 (view, m): evidence of each view for the candidate, nats."""
     track_index: Ints
-    """int64 (m,): the predicted track that it would continue, -1 for births."""
+    """int64 (m,): the predicted track that it continues, -1 for births."""
+    box: Ints
+    """int64 (view, m): its box in each view, -1 for none."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +90,14 @@ class MapEstimate:
         return self.with_more(more).with_members(start)._searched()
 
     @cached_property
-    def members_score(self) -> SetScore:
-        """Score of the members."""
-        count = len(self.members)
-        view_evidence, tracks = np.empty((len(self.evidence.views), count)), np.empty(count, np.int64)
-        total = fill_set_score(self.members, self.problem, view_evidence, tracks)
-        return SetScore(total, self._of_views(view_evidence), tracks)
+    def total(self) -> float:
+        """Score of the members, nats."""
+        return self.additions(self.members[:0]).total
+
+    @cached_property
+    def members_score(self) -> Additions:
+        """Score of the members, and `additions` of them."""
+        return self.additions(self.members)
 
     @property
     def track_index(self) -> Ints:
@@ -112,16 +105,14 @@ class MapEstimate:
         return self.members_score.track_index
 
     def additions(self, candidates: Ints) -> Additions:
-        """Gains of some candidates, int64 (m,), each by itself; of members, what they are worth, and that alone."""
+        """Gains of some candidates, int64 (m,), each by itself; of members, what they are worth."""
         gains, tracks = np.empty(len(candidates)), np.empty(len(candidates), np.int64)
-        view_evidence = np.zeros((len(self.evidence.views), len(candidates)))
-        fill_gains(self.members, candidates, self.problem, gains, view_evidence, tracks)
-        return Additions(gains, self._of_views(view_evidence), tracks)
-
-    def _of_views(self, view_evidence: Floats) -> Floats:
-        """The problem's evidence, which has the views with boxes first, in the order of the views."""
+        evidence = np.zeros((len(self.evidence.views), len(candidates)))
+        box = np.full(evidence.shape, -1, np.int64)
+        total = fill_gains(self.members, candidates, self.problem, gains, evidence, box, tracks)
         pixels_last = np.argsort([isinstance(view, PixelView) for view in self.evidence.views], kind="stable")
-        return view_evidence[np.argsort(pixels_last)]
+        order = np.argsort(pixels_last)  # the problem has the views with boxes first
+        return Additions(total, gains, evidence[order], tracks, box[order])
 
     @cached_property
     def others(self) -> Ints:
@@ -135,10 +126,10 @@ class MapEstimate:
         """`additions` of all candidates outside the set."""
         return self.additions(self.others)
 
-    @cached_property
+    @property
     def losses(self) -> Floats:
         """Loss of score without each member, nats, float64 (n,)."""
-        return self.additions(self.members).gain
+        return self.members_score.gain
 
     def alternatives(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
@@ -148,28 +139,21 @@ class MapEstimate:
         number = _add_separate(self.pool.ground, order, distance, chosen, count)
         return chosen[count:number]
 
+    @property
+    def member_boxes(self) -> Ints:
+        """The box of each member in each view, int64 (view, member), -1 for none."""
+        return self.members_score.box
+
     @cached_property
     def box_assignment(self) -> list[Ints]:
         """For each view the member that each box is assigned to, int64 (box,); -1 for none."""
-        boxes = np.empty(self.problem.boxes.match.shape[::2], np.int64)
-        fill_box_assignment(self.members, self.problem, boxes)
-        rows = iter(boxes)
-        return [
-            next(rows)[: len(observation.edges) if observation else 0]
-            if isinstance(view, BoxView)
-            else np.zeros(0, np.int64)
-            for view, observation in zip(self.evidence.views, self.evidence.observations, strict=True)
-        ]
-
-    @cached_property
-    def member_boxes(self) -> Ints:
-        """The box of each member in each view, int64 (view, member), -1 for none."""
-        box = np.full((len(self.evidence.views), len(self.members)), -1, np.int64)
-        if len(self.problem.boxes.boxes):
-            for row, member_of in zip(box, self.box_assignment, strict=True):
-                assigned = np.flatnonzero(member_of >= 0)
-                row[member_of[assigned]] = assigned
-        return box
+        pairs = zip(self.evidence.views, self.evidence.observations, strict=True)
+        numbers = [len(o.edges) if o and isinstance(view, BoxView) else 0 for view, o in pairs]
+        assignment = [np.full(number, -1, np.int64) for number in numbers]
+        for member_of, box in zip(assignment, self.member_boxes, strict=True):
+            assigned = np.flatnonzero(box >= 0)
+            member_of[box[assigned]] = assigned
+        return assignment
 
     @cached_property
     def pixel_assignment(self) -> list[Shorts]:

@@ -7,6 +7,8 @@ measured without them. So close members are also tried as one, measured with all
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 
 from stseg.arrays import Flags, Ints
@@ -37,16 +39,11 @@ def merged(estimate: MapEstimate) -> MapEstimate:
         for absorbed in [others, *(others[[i]] for i in range(len(others) if len(others) > 1 else 0))]:
             replaced = estimate.members[np.append(absorbed, a)]
             rest = best.members[~np.isin(best.members, replaced)]
-            trial = max((best.with_members(np.append(rest, body)) for body in bodies), key=_total)
-            if len(trial.members) < len(best.members) and _total(trial) > _total(best) + SCORE_TOLERANCE:
+            trial = max((best.with_members(np.append(rest, body)) for body in bodies), key=attrgetter("total"))
+            if len(trial.members) < len(best.members) and trial.total > best.total + SCORE_TOLERANCE:
                 best = trial
                 break
     return best
-
-
-def _total(estimate: MapEstimate) -> float:
-    """Score of the members, nats."""
-    return estimate.members_score.total
 
 
 def _centred(estimate: MapEstimate, is_close: Flags, separate: Ints) -> MapEstimate:

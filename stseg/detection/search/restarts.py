@@ -37,7 +37,7 @@ def restarted(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
 
 def better_of(estimate: MapEstimate, trial: MapEstimate) -> MapEstimate:
     """A trial, if it explains the frame better than the estimate."""
-    return trial if trial.members_score.total > estimate.members_score.total + _MINIMUM_GAIN else estimate
+    return trial if trial.total > estimate.total + _MINIMUM_GAIN else estimate
 
 
 def has_weak_members(estimate: MapEstimate) -> bool:
