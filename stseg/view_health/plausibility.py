@@ -19,6 +19,8 @@ _MOST_BOXES = 4000
 """Most boxes, or steps, that are looked at."""
 _FITTING, _MISFITTING = 0.5, 0.25
 """Least share of boxes that fit bodies under a reading that is named; largest share under the given one."""
+_HARDLY = 0.02
+"""Share of boxes that fit bodies below which the rig or the columns are doubted."""
 _CORNERS = 0.99
 """Share of boxes larger than their distance from the image's corner, or within 2 pixels of it, for a statement."""
 _HEIGHTS = (0.7, 1.3)
@@ -56,6 +58,8 @@ def box_warnings(camera: Camera, grid: Grid, pixel: Floats, height: float) -> li
     corner, size = pixel[:, :2], pixel[:, 2:]
     if np.quantile(corner + size, _CORNERS) <= 2:
         return [f"{camera.name}: all boxes lie within 0 to 2 pixels: are they shares of the image's width and height?"]
+    if np.median(size.min(axis=1)) < 1:
+        return [f"{camera.name}: half of its boxes are less than a pixel wide or high: are the columns right?"]
     if (size > corner).all(axis=1).mean() > _CORNERS:
         words = "are they corners x1, y1, x2, y2, given as left, top, width, height?"
         return [f"{camera.name}: nearly all boxes are larger than their distance from the image's corner: {words}"]
@@ -71,6 +75,8 @@ def box_warnings(camera: Camera, grid: Grid, pixel: Floats, height: float) -> li
     if share >= _FITTING:
         fit = f"{100 * given:.0f} % of its boxes fit a body on the ground"
         return [f"{camera.name}: {fit}, and {100 * share:.0f} % if they are {words}"]
+    if given < _HARDLY:
+        return [f"{camera.name}: {100 * given:.0f} % of its boxes fit a body on the ground: are columns and rig right?"]
     return []
 
 

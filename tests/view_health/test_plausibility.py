@@ -80,8 +80,10 @@ SHIFTED = "people stand where other cameras see them no more often than by chanc
         (lambda boxes, _: 2 * boxes, "boxes begin beyond the image"),
         (lambda boxes, _: np.hstack([boxes[:, :2] + boxes[:, 2:] / 2, boxes[:, 2:]]), SHIFTED),
         (lambda boxes, _: np.hstack([boxes[:, :2] - 3 * boxes[:, 2:], boxes[:, 2:]]), "project outside the area"),
+        (lambda boxes, _: boxes * [1, 1, 0, 1], "less than a pixel wide"),
+        (lambda boxes, _: boxes * [1, 1, 1, 1 / 4] + boxes[:, 3:] * [0, 3 / 4, 0, 0], "fit a body on the ground: are"),
     ],
-    ids=["shares", "corners", "half", "double", "centres", "beside"],
+    ids=["shares", "corners", "half", "double", "centres", "beside", "flat", "short"],
 )
 def test_boxes_in_another_form_are_named(
     recording: Recording, summaries: list[SourceSummary], changed: Callable[[Floats, Camera], Floats], named: str
