@@ -34,7 +34,7 @@ def run_warnings(run: Run) -> list[str]:
         *_emptiness(run),
         *source_warnings(run.recording),
         *track_warnings(run.frame_rate, run.trajectory),
-        *or_swapped(
+        *explained_by_swap(
             run.recording,
             int(run.frames[0]),
             [
@@ -60,7 +60,7 @@ def _emptiness(run: Run) -> Iterator[str]:
         yield f"no view sees {100 * unseen:.0f} % of the ground"
 
 
-def or_swapped(recording: Recording, first: int, warnings: list[str]) -> list[str]:
+def explained_by_swap(recording: Recording, first: int, warnings: list[str]) -> list[str]:
     """The warnings of views, or that of two swapped cameras, by the frames from `first` of sources that still exist.
 
     It is checked where a warning names a camera: a check takes seconds, in a crowd a minute.

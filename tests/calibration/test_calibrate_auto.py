@@ -25,7 +25,7 @@ from stseg.calibration.automatic.endpoints import Endpoints, upright_endpoints
 from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measured, scale_spread
 from stseg.calibration.automatic.single_view import view_of_upright
 from stseg.calibration.automatic.solution import SolvedViews, refine_cameras
-from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored_paths
+from stseg.calibration.automatic.view_alignment import ViewPlaces, align, mirrored
 from stseg.calibration.bundle_adjustment import residuals
 from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto
@@ -107,10 +107,10 @@ def test_who_is_not_whole_free_and_upright_has_no_ends(bodies: list[tuple[float,
     assert upright_endpoints(painted(*bodies)).shape == (0, 2, 2)
 
 
-def true_walks(scene: Walking) -> list[ViewPaths]:
+def true_walks(scene: Walking) -> list[ViewPlaces]:
     """People on the ground that the true cameras have them on."""
     return [
-        ViewPaths(endpoints.frame, camera.back_project(endpoints.foot) @ np.array([1, 1j]))
+        ViewPlaces(endpoints.frame, camera.back_project(endpoints.foot) @ np.array([1, 1j]))
         for camera, endpoints in zip(scene.rig.cameras, scene.views.endpoints, strict=True)
     ]
 
@@ -119,11 +119,11 @@ def true_walks(scene: Walking) -> list[ViewPaths]:
 @given(st.floats(-3, 3), st.integers(-8, 8))
 def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> None:
     a = true_walks(walking(2, 2, 30.0, 0))[0]
-    b = ViewPaths(a.frame + delay, np.exp(1j * turn) * a.place + 2 - 1j)
+    b = ViewPlaces(a.frame + delay, np.exp(1j * turn) * a.place + 2 - 1j)
     best = align(a, b, 5.0, 10)[0]
     assert best.delay == delay and best.support > 0.9 * len(a.frame)
     assert abs(best.factor - np.exp(1j * turn)) < 0.02 and abs(best.shift - (2 - 1j)) < 0.05
-    assert align(a, mirrored_paths(b), 5.0, 10)[0].support < 0.6 * best.support
+    assert align(a, mirrored(b), 5.0, 10)[0].support < 0.6 * best.support
 
 
 def test_meetings_join_one_row_a_view_and_follow_people() -> None:
@@ -242,8 +242,8 @@ def test_known_distances_make_the_plan_right(scene: Walking, solution: SolvedVie
     assert scale == pytest.approx(1.0, abs=0.015 if count == 1 else 0.01)
 
 
-def judge(paths: list[ViewPaths]) -> None:
-    require_merged(NAMES, paths, merge_views(paths, align_all(paths, 5.0, 10, lambda: None)), 5.0, 10)
+def judge(places: list[ViewPlaces]) -> None:
+    require_merged(NAMES, places, merge_views(places, align_all(places, 5.0, 10, lambda: None)), 5.0, 10)
 
 
 def test_views_of_the_same_people_are_let_pass(scene: Walking) -> None:
@@ -253,7 +253,7 @@ def test_views_of_the_same_people_are_let_pass(scene: Walking) -> None:
 def test_another_time_and_a_mirrored_view_are_named(scene: Walking) -> None:
     a, b, c = true_walks(scene)
     refused(SourceError, r"^c: .* at the same time", judge, [a, b, replace(c, frame=c.frame + 500)])
-    refused(SourceError, r"^b: .* mirror", judge, [a, mirrored_paths(b), c])
+    refused(SourceError, r"^b: .* mirror", judge, [a, mirrored(b), c])
 
 
 def test_people_who_stay_and_people_who_are_few_are_named(scene: Walking) -> None:

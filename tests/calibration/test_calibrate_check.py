@@ -32,7 +32,7 @@ from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.reporting.pictures.overlay import grid_picture
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig
-from stseg.tasks.warnings import or_swapped
+from stseg.tasks.warnings import explained_by_swap
 
 RIG = ring()
 WALK = walkers(40)
@@ -190,8 +190,8 @@ class TestCommand:
     def test_a_run_blames_the_exchange_for_what_its_views_look_like(self, rig_file: Path) -> None:
         recording, said = read_recording(rig_file), ["view cam2 denies most people"]
         swapped = replace(recording, rig=exchanged(RIG, 1, 3))
-        assert or_swapped(recording, 0, said) == said and or_swapped(swapped, 0, []) == []
-        (warning,) = or_swapped(swapped, 0, said)
+        assert explained_by_swap(recording, 0, said) == said and explained_by_swap(swapped, 0, []) == []
+        (warning,) = explained_by_swap(swapped, 0, said)
         assert warning.startswith("cam2 and cam4 seem to be swapped")
 
     def test_as_json_of_some_frames(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,7 +15,7 @@ from stseg.calibration.automatic.solution import (
     refine_cameras,
     refine_with_marks,
     single_view_cameras,
-    view_paths,
+    view_places,
 )
 from stseg.calibration.pinhole import CENTRE
 from stseg.geometry import Camera, Grid
@@ -61,8 +61,8 @@ def test_a_bare_floor_has_no_marks(cameras: tuple[Camera, ...]) -> None:
 def test_marks_bring_cameras_nearer_to_the_truth() -> None:
     scene = walking(2, 2, 12.0, noise=2.0)
     single_cameras = single_view_cameras(scene.views, lambda: None)
-    paths = view_paths(scene.views, single_cameras)
-    merged = merge_views(paths, align_all(paths, 5.0, 0, lambda: None))
+    places = view_places(scene.views, single_cameras)
+    merged = merge_views(places, align_all(places, 5.0, 0, lambda: None))
     by_people = refine_cameras(scene.views, placed_views(single_cameras, merged), np.zeros(2, np.int64), lambda: None)
     true = exact_marks(scene)
     by_both = refine_with_marks(scene.views, by_people, true)

@@ -22,9 +22,9 @@ from stseg.calibration.automatic.solution import (
     refine_cameras,
     refine_with_marks,
     single_view_cameras,
-    view_paths,
+    view_places,
 )
-from stseg.calibration.automatic.view_alignment import IDENTITY, Alignment, ViewPaths, align, mirrored_paths, support
+from stseg.calibration.automatic.view_alignment import IDENTITY, Alignment, ViewPlaces, align, mirrored, support
 from stseg.calibration.pinhole import moved
 from stseg.errors import SourceError
 
@@ -45,44 +45,44 @@ class MergedViews:
 
 
 def align_all(
-    paths: Sequence[ViewPaths], frame_rate: float, most_delay: int, progress: Callable[[], None]
+    places: Sequence[ViewPlaces], frame_rate: float, most_delay: int, progress: Callable[[], None]
 ) -> dict[tuple[int, int], list[Alignment]]:
     """Alignments of every two views, by (lower index, higher index)."""
     found = {}
-    for i, j in combinations(range(len(paths)), 2):
-        found[i, j] = align(paths[i], paths[j], frame_rate, most_delay)
+    for i, j in combinations(range(len(places)), 2):
+        found[i, j] = align(places[i], places[j], frame_rate, most_delay)
         progress()
     return found
 
 
-def merge_views(paths: Sequence[ViewPaths], pairs: Pairs) -> MergedViews:
+def merge_views(places: Sequence[ViewPlaces], pairs: Pairs) -> MergedViews:
     """Merge all views with the greatest total support.
 
     Parameters
     ----------
-    paths
-        Paths of each view on a ground of its own.
+    places
+        Places of the people of each view on a ground of its own.
     pairs
         Alignments of every two views, see `align_all`.
     """
     starts = [(one.support, i, j, one) for (i, j), several in pairs.items() for one in several[:2]]
     starts.sort(key=lambda start: -start[0])
-    grown = [_grown(paths, pairs, {i: IDENTITY, j: one}) for _, i, j, one in starts[:_STARTS]]
-    return max(grown, key=lambda merged: float(merged.support.sum()), default=MergedViews({}, _agreements(paths, {})))
+    grown = [_grown(places, pairs, {i: IDENTITY, j: one}) for _, i, j, one in starts[:_STARTS]]
+    return max(grown, key=lambda merged: float(merged.support.sum()), default=MergedViews({}, _agreements(places, {})))
 
 
-def _grown(paths: Sequence[ViewPaths], pairs: Pairs, placed: dict[int, Alignment]) -> MergedViews:
-    while len(placed) < len(paths):
-        offers = [offer for view in range(len(paths)) if view not in placed for offer in _offers(view, pairs, placed)]
+def _grown(places: Sequence[ViewPlaces], pairs: Pairs, placed: dict[int, Alignment]) -> MergedViews:
+    while len(placed) < len(places):
+        offers = [offer for view in range(len(places)) if view not in placed for offer in _offers(view, pairs, placed)]
         judged = []
         for view, place in offers:
-            joint = (support(paths[k], paths[view], way.inverse.then(place)) for k, way in placed.items())
+            joint = (support(places[k], places[view], way.inverse.then(place)) for k, way in placed.items())
             judged.append((sum(joint), view, place))
         if not judged:
             break
         _, view, place = max(judged, key=lambda one: one[0])
         placed = placed | {view: place}
-    return MergedViews(placed, _agreements(paths, placed))
+    return MergedViews(placed, _agreements(places, placed))
 
 
 def _offers(view: int, pairs: Pairs, placed: Mapping[int, Alignment]) -> list[tuple[int, Alignment]]:
@@ -94,10 +94,10 @@ def _offers(view: int, pairs: Pairs, placed: Mapping[int, Alignment]) -> list[tu
     ]
 
 
-def _agreements(paths: Sequence[ViewPaths], placed: Mapping[int, Alignment]) -> Floats:
-    table = np.zeros((len(paths), len(paths)))
+def _agreements(places: Sequence[ViewPlaces], placed: Mapping[int, Alignment]) -> Floats:
+    table = np.zeros((len(places), len(places)))
     for i, j in combinations(sorted(placed), 2):
-        table[i, j] = table[j, i] = support(paths[i], paths[j], placed[i].inverse.then(placed[j]))
+        table[i, j] = table[j, i] = support(places[i], places[j], placed[i].inverse.then(placed[j]))
     return table
 
 
@@ -141,10 +141,10 @@ def calibrate_from_people(names: Sequence[str], views: CalibrationInput, progres
     for name, endpoints in zip(names, views.endpoints, strict=True):
         require_people(name, endpoints)
     single_cameras = single_view_cameras(views, progress)
-    paths = view_paths(views, single_cameras)
+    places = view_places(views, single_cameras)
     most = round(views.most_delay * views.frame_rate)
-    merged = merge_views(paths, align_all(paths, views.frame_rate, most, progress))
-    require_merged(names, paths, merged, views.frame_rate, most)
+    merged = merge_views(places, align_all(places, views.frame_rate, most, progress))
+    require_merged(names, places, merged, views.frame_rate, most)
     delay = np.array([merged.placed[k].delay for k in range(len(names))], np.int64)
     solution = refine_cameras(views, placed_views(single_cameras, merged), delay, progress)
     require_correspondences(names, solution)
@@ -195,13 +195,13 @@ def require_people(name: str, endpoints: Endpoints) -> None:
 
 
 def require_merged(
-    names: Sequence[str], paths: Sequence[ViewPaths], merged: MergedViews, rate: float, most: int
+    names: Sequence[str], places: Sequence[ViewPlaces], merged: MergedViews, rate: float, most: int
 ) -> None:
     """Raise SourceError for a view that fits no other, or only when mirrored."""
-    share = agreement_shares(paths, merged)
+    share = agreement_shares(places, merged)
     worst = int(np.argmin(share))
     for view in np.argsort(share):
-        if share[view] < _MIN_AGREEMENT + 0.2 and (other := _mirror(int(view), paths, merged, rate, most)) is not None:
+        if share[view] < _MIN_AGREEMENT + 0.2 and (other := _mirror(int(view), places, merged, rate, most)) is not None:
             found = f"people who meet those of {names[other]} only in a mirror"
             raise SourceError(names[int(view)], "", found, "an image that is not mirrored")
     if share[worst] < _MIN_AGREEMENT:
@@ -210,25 +210,25 @@ def require_merged(
         raise SourceError(names[worst], "", found, expected)
 
 
-def agreement_shares(paths: Sequence[ViewPaths], merged: MergedViews) -> list[float]:
+def agreement_shares(places: Sequence[ViewPlaces], merged: MergedViews) -> list[float]:
     """Share of the common frames in which each view agrees with its best partner, 0..1."""
     shares = []
-    for view, view_path in enumerate(paths):
+    for view in range(len(places)):
         best = 0.0
-        for other, other_path in enumerate(paths):
+        for other in range(len(places)):
             if other != view and view in merged.placed and other in merged.placed:
                 delay_frames = merged.placed[other].delay - merged.placed[view].delay
-                common = len(np.intersect1d(view_path.frame + delay_frames, other_path.frame))
+                common = len(np.intersect1d(places[view].frame + delay_frames, places[other].frame))
                 best = max(best, float(merged.support[view, other]) / max(common, _MIN_ENDPOINTS))
         shares.append(min(best, 1.0))
     return shares
 
 
-def _mirror(view: int, paths: Sequence[ViewPaths], merged: MergedViews, rate: float, most: int) -> int | None:
+def _mirror(view: int, places: Sequence[ViewPlaces], merged: MergedViews, rate: float, most: int) -> int | None:
     """The view that agrees far better with the mirror image of this one, or None."""
     for other in np.argsort(-merged.support[view]):
         if other != view:
-            found = align(paths[int(other)], mirrored_paths(paths[view]), rate, most)
+            found = align(places[int(other)], mirrored(places[view]), rate, most)
             if found and found[0].support > 1.5 * merged.support[view].max():
                 return int(other)
     return None

@@ -12,7 +12,7 @@ from stseg.calibration.automatic.correspondence import Correspondences, match_en
 from stseg.calibration.automatic.endpoints import Endpoints, even_rows
 from stseg.calibration.automatic.floor_features import Marks
 from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
-from stseg.calibration.automatic.view_alignment import ViewPaths
+from stseg.calibration.automatic.view_alignment import ViewPlaces
 from stseg.calibration.bundle_adjustment import Adjustment, BundleParameters, BundleProblem, adjust, same_make
 from stseg.calibration.pinhole import CLOCK, height_of_head
 
@@ -78,13 +78,13 @@ def single_view_cameras(views: CalibrationInput, progress: Callable[[], None]) -
     return single_cameras
 
 
-def view_paths(views: CalibrationInput, single_cameras: Sequence[Floats]) -> list[ViewPaths]:
+def view_places(views: CalibrationInput, single_cameras: Sequence[Floats]) -> list[ViewPlaces]:
     """Ground points of each view's people, on its own ground."""
-    paths = []
+    places = []
     for endpoints, size, view in zip(views.endpoints, views.sizes, single_cameras, strict=True):
         place = axis_of_foot(view, size, endpoints.foot, FORWARD)
-        paths.append(ViewPaths(endpoints.frame, place[:, 0] + 1j * place[:, 1]))
-    return paths
+        places.append(ViewPlaces(endpoints.frame, place[:, 0] + 1j * place[:, 1]))
+    return places
 
 
 def refine_cameras(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> SolvedViews:

@@ -26,7 +26,7 @@ _MAX_ALIGNMENTS = 5
 
 
 @dataclass(frozen=True)
-class ViewPaths:
+class ViewPlaces:
     """Ground points of one view's people, on a ground of its own."""
 
     frame: Ints
@@ -62,7 +62,7 @@ IDENTITY = Alignment(0, 1 + 0j, 0j, 0.0)
 """Identity."""
 
 
-def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
+def align(a: ViewPlaces, b: ViewPlaces, frame_rate: float, most_delay: int) -> list[Alignment]:
     """The few best supported alignments of two views, the best first.
 
     Parameters
@@ -85,9 +85,9 @@ def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> lis
     return sorted(best, key=lambda one: -one.support)
 
 
-def mirrored_paths(paths: ViewPaths) -> ViewPaths:
-    """The paths mirrored."""
-    return ViewPaths(paths.frame, np.conj(paths.place))
+def mirrored(places: ViewPlaces) -> ViewPlaces:
+    """The places mirrored."""
+    return ViewPlaces(places.frame, np.conj(places.place))
 
 
 def _differ(one: Alignment, other: Alignment, frame_rate: float) -> bool:
@@ -96,7 +96,7 @@ def _differ(one: Alignment, other: Alignment, frame_rate: float) -> bool:
     return bool(turned or abs(one.delay - other.delay) > frame_rate or abs(one.shift - other.shift) > 1.5)
 
 
-def _hypotheses(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
+def _hypotheses(a: ViewPlaces, b: ViewPlaces, frame_rate: float, most_delay: int) -> list[Alignment]:
     """Hypotheses from two point pairs, each at a time of its own, the best supported first.
 
     Delays are tried in steps of 0.3 s, within which no person leaves the gate.
@@ -109,7 +109,7 @@ def _hypotheses(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) 
     return sorted(found, key=lambda one: -one.support)[:_HYPOTHESES]
 
 
-def _at_delay(a: ViewPaths, b: ViewPaths, delay: int, rng: np.random.Generator) -> list[Alignment]:
+def _at_delay(a: ViewPlaces, b: ViewPlaces, delay: int, rng: np.random.Generator) -> list[Alignment]:
     of_a, of_b = _same_time(a, b, delay)
     finite = np.isfinite(a.place[of_a]) & np.isfinite(b.place[of_b])
     x, y = a.place[of_a[finite]], b.place[of_b[finite]]
@@ -129,7 +129,7 @@ def _at_delay(a: ViewPaths, b: ViewPaths, delay: int, rng: np.random.Generator) 
     return [Alignment(delay, complex(factor[k]), complex(shift[k]), float(support[k])) for k in best]
 
 
-def _refined(a: ViewPaths, b: ViewPaths, one: Alignment) -> Alignment:
+def _refined(a: ViewPlaces, b: ViewPlaces, one: Alignment) -> Alignment:
     """Iteratively reweighted refinement from all agreeing pairs."""
     factor, shift = one.factor, one.shift
     rows = _same_time(a, b, one.delay)
@@ -150,7 +150,7 @@ def _refined(a: ViewPaths, b: ViewPaths, one: Alignment) -> Alignment:
     return best
 
 
-def _at_best_delay(a: ViewPaths, b: ViewPaths, one: Alignment, most_delay: int) -> Alignment:
+def _at_best_delay(a: ViewPlaces, b: ViewPlaces, one: Alignment, most_delay: int) -> Alignment:
     """Local search over the delay."""
     best, step = one, 8
     while step:
@@ -164,12 +164,12 @@ def _at_best_delay(a: ViewPaths, b: ViewPaths, one: Alignment, most_delay: int) 
     return best
 
 
-def support(a: ViewPaths, b: ViewPaths, one: Alignment) -> float:
+def support(a: ViewPlaces, b: ViewPlaces, one: Alignment) -> float:
     """Support of an alignment: number of agreeing people and frames, weighted by closeness."""
     return _agreement(a, b, _same_time(a, b, one.delay), one.factor, one.shift)[0]
 
 
-def _same_time(a: ViewPaths, b: ViewPaths, delay: int) -> tuple[Ints, Ints]:
+def _same_time(a: ViewPlaces, b: ViewPlaces, delay: int) -> tuple[Ints, Ints]:
     """All pairs of rows of the two views in common frames."""
     begin = np.searchsorted(b.frame, a.frame + delay, "left")
     count = np.searchsorted(b.frame, a.frame + delay, "right") - begin
@@ -178,7 +178,7 @@ def _same_time(a: ViewPaths, b: ViewPaths, delay: int) -> tuple[Ints, Ints]:
 
 
 def _agreement(
-    a: ViewPaths, b: ViewPaths, rows: tuple[Ints, Ints], factor: complex, shift: complex
+    a: ViewPlaces, b: ViewPlaces, rows: tuple[Ints, Ints], factor: complex, shift: complex
 ) -> tuple[float, Floats]:
     """Support with each row counted once (mutual best matches), and the weight of each pair of rows."""
     away = np.abs(factor * a.place[rows[0]] + shift - b.place[rows[1]])
