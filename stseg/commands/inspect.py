@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
+from stseg.commands.terminal.standard_error import frame_bar
 from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
@@ -69,10 +70,13 @@ def inspect(
         raise ConfigError("command line", "", f"{given} alone", f"{other} with it")
     if slice_ is not None and output is not None:
         print(f"wrote {output}: {write_slice(found, slice_, output, overwrite)}")
-    elif as_json:
-        print(json.dumps(asdict(summarise_run(found)), indent=1))
+        return
+    with frame_bar("summarising", None):
+        overview = summarise_run(found)
+    if as_json:
+        print(json.dumps(asdict(overview), indent=1))
     else:
-        _show(summarise_run(found), output_console())
+        _show(overview, output_console())
 
 
 def _inspect_rig(path: Path, pictures: Path | None, overwrite: bool) -> None:

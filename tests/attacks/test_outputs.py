@@ -135,6 +135,7 @@ def filled(database: object) -> dict[str, int]:
         ("evaluate tracks.csv tracks.csv", "scoring"),
         ("export run.h5 --to csv -o out.csv", "writing"),
         ("measure run.h5 -o measures", "measuring"),
+        ("inspect run.h5", "summarising"),
         ("review run.h5 -o review.html", "searching"),
         ("correct run.h5 answers.csv -o corrected.h5", "correcting"),
         ("report run.h5 -o page.html", "drawing"),
