@@ -33,6 +33,8 @@ _LEAST_DIFFERENCES = 20
 """Least number of differences over a lag."""
 _PRIOR_DIFFERENCES = 50.0
 """Weight of the prior: differences over each lag."""
+_TIME_SPREAD = 1.0
+"""Spread of the logarithm of time constants about that of the prior."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ def constant_errors(
             count[k] += len(later)
     number = np.maximum(count, 1.0)
     variogram = 0.5 * (roots / number) ** 4 / (0.457 + 0.494 / number)
-    return _fitted(variogram, count, lags / rate, prior)
+    return _fitted(variogram, count, lags, prior, rate)
 
 
 def _lags(frame: Ints, tracklets: Sequence[Ints], rate: float) -> Ints:
@@ -118,27 +120,32 @@ def _pairs(frames: Ints, lags: Ints) -> list[tuple[Ints, Ints]]:
     return [(np.flatnonzero(which), later[which]) for later, which in zip(after, paired, strict=True)]
 
 
-def _fitted(variogram: Floats, count: Floats, seconds: Floats, prior: LastingError) -> LastingError:
-    """Errors by the variogram (quantity, lag), the numbers of differences (lag,), and the lags (lag,)."""
+def _fitted(variogram: Floats, count: Floats, lags: Ints, prior: LastingError, rate: float) -> LastingError:
+    """Errors by the variogram (quantity, lag), the numbers of differences (lag,), and the lags (lag,), frames.
+
+    Differences that overlap are alike: those over m frames say as much as an m-th of their number.
+    """
     enough = count >= _LEAST_DIFFERENCES
     enough[0] = True
-    variogram, count, seconds = variogram[:, enough], count[enough], seconds[enough]
+    variogram, count, lags = variogram[:, enough], count[enough], lags[enough]
+    seconds = lags / rate
     of_prior = 1.0 - np.exp(-seconds / prior.seconds[:, None])
     expected = prior.white[:, None] + prior.lasting[:, None] * of_prior
     measured = (count * variogram + _PRIOR_DIFFERENCES * expected) / (count + _PRIOR_DIFFERENCES)
-    # What lasts longer than the longest lag cannot be told from what is constant.
-    times = _TIMES[: max(int(np.searchsorted(_TIMES, seconds[-1], "right")), 1)]
-    shapes = 1.0 - np.exp(-seconds / times[:, None])
-    found = [_fit(value, count + _PRIOR_DIFFERENCES, shapes, times) for value in measured]
+    shapes = 1.0 - np.exp(-seconds / _TIMES[:, None])
+    # A share of 2 / n of its square is the variance of a mean of n squares.
+    unlike = 2.0 * (np.log(_TIMES / prior.seconds[:, None]) / _TIME_SPREAD) ** 2
+    weight = (count + _PRIOR_DIFFERENCES) / lags
+    found = [_fit(value, weight, shapes, cost) for value, cost in zip(measured, unlike, strict=True)]
     return LastingError(*np.array(found, np.float64).reshape(-1, 3).T)
 
 
-def _fit(measured: Floats, count: Floats, shapes: Floats, times: Floats) -> tuple[float, float, float]:
-    """a^2, b^2 and tau of least squares; a mean of squares errs in proportion to itself."""
+def _fit(measured: Floats, count: Floats, shapes: Floats, cost: Floats) -> tuple[float, float, float]:
+    """a^2, b^2 and tau of least squares, with the cost of each tau; a mean of squares errs in proportion to itself."""
     from scipy.optimize import nnls  # a start that fits nothing is faster without it
 
     weight = np.sqrt(count) / np.maximum(measured, 1e-12)
     fits = [nnls(np.column_stack([weight, weight * shape]), weight * measured) for shape in shapes]
-    best = int(np.argmin([residual for _, residual in fits]))
+    best = int(np.argmin(cost + [residual**2 for _, residual in fits]))
     white, lasting = fits[best][0].tolist()
-    return white, lasting, float(times[best])
+    return white, lasting, float(_TIMES[best])

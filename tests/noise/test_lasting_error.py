@@ -65,3 +65,13 @@ def test_people_who_sit_down_are_no_errors() -> None:
     before = found(values, frame)
     values[:2, 80:] -= 0.4
     assert found(values, frame).row_variance(RATE)[0] < 1.5 * before.row_variance(RATE)[0]
+
+
+def test_one_long_tracklet_says_little_of_far_lags() -> None:
+    """Most tracklets are short; in the only long one somebody rises from a chair."""
+    values, frame = recording(0.02, 0.03, 0.6, people=151)
+    values[0, 80:] += 0.5
+    short = np.split(np.arange(160, values.size), 150)
+    tracklets = [np.arange(160), *(rows[:16] for rows in short)]
+    errors = constant_errors(values.reshape(1, -1), frame, tracklets, PRIOR, RATE)
+    assert errors.variance[0] < 2 * (0.02**2 + 0.03**2)
