@@ -12,7 +12,7 @@ from stseg.arrays import AnyArray, Boxes, Bytes, Labels, Observation, Rows
 from stseg.geometry import Rig
 from stseg.reporting.charts import clock_time
 from stseg.reporting.pictures.canvas import blank, chips, disc, fading_stroke, text
-from stseg.reporting.pictures.colours import NIGHT, PAPER, QUIET, Picture, track_colour
+from stseg.reporting.pictures.colours import PAPER, QUIET, Picture, track_colour
 from stseg.reporting.pictures.overlay import OverlayView, overlay
 from stseg.reporting.pictures.plan import ground_sheet, plan_map, plan_view
 from stseg.reporting.pictures.slices import marginal_picture, volume_picture
@@ -142,10 +142,14 @@ class RunFilm:
         self._wide = min(_MAX_VIEW_WIDTH, _MAX_WIDTH // self._columns)
         self._tall = max(OverlayView(camera, self._wide).size[1] for camera in rig.cameras)
         rows = -(-count // self._columns)
-        height = max(rows * self._tall, _MIN_HEIGHT)
-        self._plan = plan_map(rig, height, height)
+        views_size = self._columns * self._wide, rows * self._tall
+        side, foot = plan_map(rig, _MIN_HEIGHT, max(views_size[1], _MIN_HEIGHT), 0), plan_map(rig, *views_size, 0)
+        is_below = foot.scale > side.scale
+        self._plan = foot if is_below else side
+        self._corner = (views_size[0] - foot.size[0]) // 2 if is_below else views_size[0], views_size[1] * is_below
         self._ground = ground_sheet(self._plan, rig, views.max(axis=0), rig.name)
-        wide, tall = self._columns * self._wide + self._plan.size[0], max(height, self._plan.size[1])
+        ends = np.add(self._corner, self._plan.size)
+        wide, tall = np.maximum(views_size, ends).tolist()
         self.size = (wide + wide % 2, tall + tall % 2)
         """Width and height, pixels; both even, as video wants them."""
 
@@ -159,17 +163,15 @@ class RunFilm:
         """
         first, stop = np.searchsorted(self._rows["frame"], [frame - self._trail, frame + 1])
         recent = self._rows[first:stop]
-        canvas = blank(*self.size, NIGHT)
+        canvas = blank(*self.size, PAPER)
         for k, (camera, view) in enumerate(zip(self._rig.cameras, views, strict=True)):
             picture = overlay(
                 camera, self._rig.grid, backdrop(view, camera.size), recent, frame, self._trail, width=self._wide
             )
             v, u = (k // self._columns) * self._tall, (k % self._columns) * self._wide
             canvas[v : v + picture.shape[0], u : u + picture.shape[1]] = picture
-        left = self._columns * self._wide
-        canvas[:, left:] = PAPER
-        plan = self._plan_of(frame, recent)
-        canvas[: plan.shape[0], left : left + plan.shape[1]] = plan
+        (left, top), plan = self._corner, self._plan_of(frame, recent)
+        canvas[top : top + plan.shape[0], left : left + plan.shape[1]] = plan
         return canvas
 
     def _plan_of(self, frame: int, recent: Rows) -> Bytes:

@@ -67,6 +67,7 @@ td.unsure { color: var(--quiet) }
   border-radius: 3px; vertical-align: -1px; margin-right: 6px }
 .bars small { color: var(--quiet) }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 20px; align-items: start }
+.pair > figure:last-child:nth-child(odd) { grid-column: 1 / -1; justify-self: center }
 .sheets { display: grid; grid-template-columns: 2fr 1fr; gap: 32px 20px; align-items: start }
 @media (max-width: 900px) { .sheets { grid-template-columns: 1fr } .pair { grid-template-columns: 1fr } }
 .chart { width: 100%; height: auto; display: block; margin-top: 8px }

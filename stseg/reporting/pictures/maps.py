@@ -11,7 +11,7 @@ from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows
 from stseg.geometry import Grid, Rig
 from stseg.reporting.pictures.canvas import chip, chips, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed
-from stseg.reporting.pictures.plan import draw_ground
+from stseg.reporting.pictures.plan import draw_ground, plan_map
 from stseg.reporting.pictures.plan_map import PlanMap, scale_bar, sheet
 
 _MAX_BINS = 40  # along the longer side of the ground, at most
@@ -118,11 +118,6 @@ def _busiest(places: Floats, bins: Bins) -> Floats:
     return np.array([middles[0][best[0]], middles[1][best[1]]])
 
 
-def map_of_maps(rig: Rig) -> PlanMap:
-    """The map from metres to pixels of these maps."""
-    return PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
-
-
 def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks: Sequence[DwellPlace] = ()) -> Picture:
     """Heat map of bins from above, y up: white for none, dark for much.
 
@@ -134,7 +129,7 @@ def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks
         Places that are lettered A, B, C.
     """
     limit = float(np.percentile(values[values > 0], 99)) if (values > 0).any() else 1.0
-    plan = map_of_maps(rig)
+    plan = plan_map(rig, 900, 900)
     canvas = sheet(plan, title)
     paint_bins(canvas, plan, bins, warm_colours(values, limit))
     draw_ground(canvas, plan, rig)
@@ -147,7 +142,7 @@ def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks
 
 def blind_map(rig: Rig, views: Bytes) -> Bytes:
     """Map of the number of views that see each ground cell at some height: none red, one orange, more lighter."""
-    plan = map_of_maps(rig)
+    plan = plan_map(rig, 900, 900)
     canvas = sheet(plan, "Views that see the ground")
     view_count = views.max(axis=0)
     most = max(len(rig.cameras), int(view_count.max()))
@@ -229,7 +224,7 @@ def flow_map(
     bins = Bins(rig.grid.x, rig.grid.y, side)
     values = field["density"].reshape(bins.shape)
     canvas = heat_map(rig, bins, values, "Density and flow", "people a square metre")
-    plan = map_of_maps(rig)
+    plan = plan_map(rig, 900, 900)
     for _, rings in zones:
         for ring in rings:
             outline(canvas, plan.pixel(ring), _ZONE, 2)
@@ -256,5 +251,8 @@ def _arrow(canvas: Bytes, plan: PlanMap, row: np.void, side: float) -> None:
     tip, tail = plan.pixel(centre + half), plan.pixel(centre - half)
     way = (tip - tail) / max(float(np.hypot(*(tip - tail))), 1e-9)
     across = np.array([-way[1], way[0]])
-    stroke(canvas, np.stack([tail, tip]), mixed(INK, PAPER, 0.1), 2)
-    fill(canvas, np.stack([tip + 5 * way, tip - 4 * way + 4 * across, tip - 4 * way - 4 * across]), INK)
+    shaft, head = np.stack([tail, tip]), tip + np.stack([6 * way, 5 * across - 5 * way, -5 * across - 5 * way])
+    stroke(canvas, shaft, PAPER, 5)
+    outline(canvas, head, PAPER, 3)
+    stroke(canvas, shaft, INK, 2)
+    fill(canvas, head, INK)

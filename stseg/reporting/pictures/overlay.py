@@ -127,11 +127,12 @@ def pillar_outline(view: OverlayView, ground: Floats, height: float) -> list[Flo
 
 def _draw_pillar(canvas: Bytes, view: OverlayView, row: np.void) -> None:
     ground, colour = np.array([row["x"], row["y"]]), track_colour(int(row["id"]))
-    for polygon in pillar_outline(view, ground, float(row["height"])):
-        fill(canvas, polygon, colour, 0.28)
-        outline(canvas, polygon, mixed(colour, PAPER, 0.15), 2)
     foot = view.pixel(ground, 0.0)
-    if np.isfinite(foot).all():
+    whole = bool((foot >= 0).all() and (foot < view.size).all())  # a body that is cut fills the picture
+    for polygon in pillar_outline(view, ground, float(row["height"])):
+        fill(canvas, polygon, colour, 0.28 if whole else 0.06)
+        outline(canvas, polygon, mixed(colour, PAPER, 0.15), 2 if whole else 1)
+    if whole:
         disc(canvas, foot, 6.5, PAPER)
         disc(canvas, foot, 5, colour)
 
@@ -193,8 +194,10 @@ def grid_picture(camera: Camera, grid: Grid, image: Bytes | None, frame: int, wi
     side = max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
     step = next((s for s in _LINE_DISTANCES if s * _MAX_LINES >= side), _LINE_DISTANCES[-1])
     _ground_lines(canvas, view, grid, _stops(grid.x, step), _stops(grid.y, step), _GRID_STYLES)
-    for ground in sorted(_pole_places(grid), key=lambda place: -float(np.hypot(*(place - camera.centre[:2])))):
+    places = sorted(_pole_places(grid), key=lambda place: float(np.hypot(*(place - camera.centre[:2]))))
+    for ground in reversed(places):
         _pole(canvas, view, ground)
+    _pole_labels(canvas, view, places)
     words = f"{camera.name}  frame {frame}  lines every {step:g} m, poles {BODY_HEIGHT} m"
     text(canvas, words, (18, 16), PAPER, 14, (0, 0), 2)
     return canvas
@@ -225,6 +228,14 @@ def _pole(canvas: Bytes, view: OverlayView, ground: AnyArray) -> None:
     stroke(canvas, pixel, _POLE_COLOUR, 3)
     for mark in (0.0, 0.5, 1.0, 1.5):
         disc(canvas, view.pixel(np.asarray(ground), mark), 4, _POLE_COLOUR)
-    u, v = pixel[-1].tolist()
-    if 0 <= u < view.size[0] and 24 <= v < view.size[1]:
-        chip(canvas, f"{ground[0] + 0.0:g}, {ground[1] + 0.0:g}", (u, v - 12), _POLE_COLOUR, 10)
+
+
+def _pole_labels(canvas: Bytes, view: OverlayView, places: Sequence[Floats]) -> None:
+    """Places of poles above them, from the first on; none on another."""
+    labelled: list[tuple[float, float]] = []
+    for ground in places:
+        u, v = view.pixel(ground, BODY_HEIGHT).tolist()
+        free = all(abs(u - other) > 50 or abs(v - above) > 22 for other, above in labelled)
+        if free and 0 <= u < view.size[0] and 24 <= v < view.size[1]:
+            chip(canvas, f"{ground[0] + 0.0:g}, {ground[1] + 0.0:g}", (u, v - 12), _POLE_COLOUR, 10)
+            labelled.append((u, v))

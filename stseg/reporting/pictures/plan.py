@@ -12,9 +12,10 @@ from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
 from stseg.reporting.pictures.canvas import MAX_LABELS, chips, dashes, disc, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed, track_colour
-from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
+from stseg.reporting.pictures.plan_map import LEGEND_WIDTH, PlanMap, rule, scale_bar, sheet
 
 _CAMERA_DISTANCE = 0.45  # cameras within this share of the ground's longer side are shown where they stand
+_CROWDED = 0.08  # length of all tracks from which they are drawn thin, pixels a pixel of the plan
 _UNSEEN_TONE: Colour = (206, 199, 195)  # seen by no view
 _TRUTH_COLOUR: Colour = (84, 76, 70)
 
@@ -77,11 +78,11 @@ def draw_ground(canvas: Bytes, plan: PlanMap, rig: Rig) -> None:
     _draw_cameras(canvas, plan, rig.cameras)
 
 
-def plan_map(rig: Rig, width: int = 1400, height: int = 1500) -> PlanMap:
+def plan_map(rig: Rig, width: int = 1400, height: int = 1500, least_width: int = LEGEND_WIDTH) -> PlanMap:
     """The map from metres to pixels of `plan_view`."""
     positions = [_ground_position(camera, rig.grid) for camera in rig.cameras]
     places = [place for place in positions if place is not None]
-    return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height)
+    return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height, least_width)
 
 
 def _ground_position(camera: Camera, grid: Grid) -> Floats | None:
@@ -112,31 +113,32 @@ def _draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> No
     """Every camera, and its name behind it, below the names that are there already."""
     named: list[tuple[float, float, int]] = []
     for camera in cameras:
-        tone, (u, v) = _draw_camera(canvas, plan, camera)
-        width = text_size(camera.name, 15)[0]
+        tone, name, (u, v) = _draw_camera(canvas, plan, camera)
+        width = text_size(name, 15)[0]
         while any(abs(u - other) < (width + wide) / 2 and abs(v - below) < 20 for other, below, wide in named):
             v += 20
         named.append((u, v, width))
-        text(canvas, camera.name, (u, v), tone, 15, (0.5, 0.5))
+        text(canvas, name, (u, v), tone, 15, (0.5, 0.5))
 
 
-def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, tuple[float, float]]:
-    """A wedge as wide as the view, pointing where it looks; at the edge of the plan where it stands beyond.
+def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, str, tuple[float, float]]:
+    """A sector as wide as the view, pointing where it looks; at the edge of the plan, hollow, where it stands beyond.
 
-    Returns its colour and where the middle of its name may stand.
+    Returns its colour, its name, with how far beyond the plan it stands, and where the middle of that may be.
     """
     position = camera.centre[:2]
     edge = np.clip(position, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
-    place, outside = plan.pixel(edge), bool((edge != position).any())
-    tone = QUIET if outside else INK
-    sides = _view_directions(camera)
-    if sides is not None:
-        wedge = np.concatenate([place[None], place + 46 * sides])
-        fill(canvas, wedge, tone, 0.16)
-        outline(canvas, wedge, mixed(tone, PAPER, 0.35))
-    disc(canvas, place, 6, PAPER)
-    disc(canvas, place, 4.5, tone)
-    return tone, _name_place(camera.name, place, np.array([0.0, -1.0]) if sides is None else -sides[1], plan)
+    place, distance = plan.pixel(edge), float(np.hypot(*(position - edge)))
+    tone, name = (QUIET, f"{camera.name}, {distance:.1f} m off") if distance else (INK, camera.name)
+    directions = _view_directions(camera)
+    if directions is not None:
+        sector = np.concatenate([place[None], place + 46 * directions])
+        fill(canvas, sector, tone, 0.16)
+        outline(canvas, sector, mixed(tone, PAPER, 0.35))
+    disc(canvas, place, 6, tone if distance else PAPER)
+    disc(canvas, place, 4.5, PAPER if distance else tone)
+    back = np.array([0.0, -1.0]) if directions is None else -directions[len(directions) // 2]
+    return tone, name, _name_place(name, place, back, plan)
 
 
 def _name_place(name: str, place: Floats, back: Floats, plan: PlanMap) -> tuple[float, float]:
@@ -154,9 +156,9 @@ def _name_place(name: str, place: Floats, back: Floats, plan: PlanMap) -> tuple[
 
 
 def _view_directions(camera: Camera) -> Floats | None:
-    """Directions on the canvas (v down) of the left, middle and right of the view; None where it looks down.
+    """Directions on the canvas (v down) from the left of the view to its right; None where it looks down.
 
-    float64 (3, 2), unit length.
+    float64 (k, 2), unit length; the one in the middle is that of the middle of the view's angle.
     """
     matrix = camera.projection[:, :3]
     width, height = camera.size
@@ -166,7 +168,9 @@ def _view_directions(camera: Camera) -> Floats | None:
     length = np.hypot(ray[:, 0], ray[:, 1])
     if not np.isfinite(ray).all() or (length < 0.2 * np.linalg.norm(ray, axis=1)).any():
         return None
-    return np.asarray(ray[:, :2] / length[:, None] * (1, -1))
+    angle = np.unwrap(np.arctan2(-ray[:, 1], ray[:, 0]))
+    between = np.linspace(angle[0], angle[2], 13)
+    return np.stack([np.cos(between), np.sin(between)], -1)
 
 
 def _paths(table: Rows) -> list[tuple[int, Floats]]:
@@ -188,7 +192,10 @@ def _paths(table: Rows) -> list[tuple[int, Floats]]:
 def _draw_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
     paths = _paths(trajectory)
     few, some = len(paths) <= 12, len(paths) <= 60
-    width, opacity = (3 if few else 2 if some else 1), (1.0 if some else max(0.2, 0.7 * (60 / len(paths)) ** 0.5))
+    length = sum(float(np.nansum(np.hypot(*np.diff(plan.pixel(path), axis=0).T))) for _, path in paths)
+    crowded = length > _CROWDED * np.prod(np.subtract(plan.far_corner, plan.corner))
+    width = 1 if crowded or not some else 3 if few else 2
+    opacity = 1.0 if some else max(0.2, 0.7 * (60 / len(paths)) ** 0.5)
     for identity, path in paths:
         colour, pixel = track_colour(identity), plan.pixel(path)
         drawn = pixel[np.isfinite(pixel[:, 0])]

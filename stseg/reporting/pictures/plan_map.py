@@ -12,7 +12,8 @@ from stseg.reporting.pictures.canvas import blank, outline, stroke, text, text_s
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Colour
 
 _LEFT_MARGIN, _RIGHT_MARGIN, _TOP_MARGIN, _BOTTOM_MARGIN = 76, 44, 104, 132  # for title, labels and legend, pixels
-_MIN_WIDTH = 900  # pixels, for the legend
+LEGEND_WIDTH = 900
+"""Least width of a plan with a legend, pixels."""
 _ROUND_DISTANCES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 
@@ -31,13 +32,16 @@ class PlanMap:
     """Width and height of the canvas, pixels."""
 
     @classmethod
-    def fit(cls, grid: Grid, places: AnyArray, width: int, height: int) -> PlanMap:
+    def fit(cls, grid: Grid, places: AnyArray, width: int, height: int, least_width: int = LEGEND_WIDTH) -> PlanMap:
         """The largest map of the grid's rectangle, and of places (n, 2) beside it, on a canvas of at most that size."""
         x, y = _bounds(grid, places)
         space = (width - _LEFT_MARGIN - _RIGHT_MARGIN, height - _TOP_MARGIN - _BOTTOM_MARGIN)
         scale = min(space[0] / (x[1] - x[0]), space[1] / (y[1] - y[0]))
         wide, tall = scale * (x[1] - x[0]), scale * (y[1] - y[0])
-        size = (max(round(wide) + _LEFT_MARGIN + _RIGHT_MARGIN, _MIN_WIDTH), round(tall) + _TOP_MARGIN + _BOTTOM_MARGIN)
+        size = (
+            max(round(wide) + _LEFT_MARGIN + _RIGHT_MARGIN, least_width),
+            round(tall) + _TOP_MARGIN + _BOTTOM_MARGIN,
+        )
         spare = size[0] - _LEFT_MARGIN - _RIGHT_MARGIN - wide
         return cls(x, y, scale, (_LEFT_MARGIN + spare / 2, float(_TOP_MARGIN)), size)
 

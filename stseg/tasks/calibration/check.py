@@ -23,7 +23,7 @@ from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.source_files import recording_files
 from stseg.reporting.figures import Figure, backdrop
-from stseg.reporting.page.html import STYLE, figures, note, section, table
+from stseg.reporting.page.html import figures, note, page, section, table
 from stseg.reporting.pictures.maps import blind_map
 from stseg.reporting.pictures.overlay import grid_picture
 from stseg.tasks.report import write_figures
@@ -187,7 +187,6 @@ def _page(found: RigCheck) -> str:
     )
     views = section("Ground and poles", figures(grids, "pair"), note("These pictures hold frames of the cameras."))
     ground = section("Coverage", figures([seen_by], "pair"))
-    title = escape(f"{found.recording.rig.name}: check of the rig")
-    head = f'<head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style></head>'
+    title = f"{found.recording.rig.name}: check of the rig"
     main = f"<main>{verdict}{numbers}{views}{ground}</main>"
-    return f'<!doctype html>\n<html lang="en">{head}\n<body><header><h1>{title}</h1></header>\n{main}</body></html>\n'
+    return page(title, f"<header><h1>{escape(title)}</h1></header>{main}", "{}", ())
