@@ -122,6 +122,14 @@ class Table:
             raise self.error(name, f"{array[wrong][0]} in it", f"{expected}, all finite{bound}")
         return array
 
+    def image_size(self, name: str) -> tuple[int, int]:
+        """Width and height of an image, pixels."""
+        size = self.numbers(name, 2)
+        if (size != size.round()).any() or (size < 1).any() or size.max() > limits.SIDE or size.prod() > limits.PIXELS:
+            expected = f"width and height in whole pixels, at most {limits.SIDE} each and {limits.PIXELS:.0e} pixels"
+            raise self.error(name, size.tolist(), expected)
+        return int(size[0]), int(size[1])
+
     def table(self, name: str) -> Self:
         """The table below this key."""
         value = self._checked(name, "a table", lambda value: isinstance(value, dict))

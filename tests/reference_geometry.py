@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Floats
+from stseg.geometry.lens import LensModel
 
 
 def project_by_matrix(projection: Floats, points: Floats) -> Floats:
@@ -13,10 +14,16 @@ def project_by_matrix(projection: Floats, points: Floats) -> Floats:
 
 
 def project_by_opencv(
-    matrix: Floats, distortion: Floats, rotation_vector: Floats, translation: Floats, points: Floats
+    matrix: Floats,
+    distortion: Floats,
+    rotation_vector: Floats,
+    translation: Floats,
+    points: Floats,
+    model: LensModel = "pinhole",
 ) -> Floats:
     """Pixels (n, 2) of points (n, 3) in the calibration's own world and unit."""
-    pixels, _ = cv2.projectPoints(np.ascontiguousarray(points, float), rotation_vector, translation, matrix, distortion)
+    project = cv2.fisheye.projectPoints if model == "fisheye" else cv2.projectPoints
+    pixels, _ = project(np.ascontiguousarray(points[None], float), rotation_vector, translation, matrix, distortion)
     return np.asarray(pixels, float).reshape(-1, 2)
 
 

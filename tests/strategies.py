@@ -9,12 +9,22 @@ from scenes import rotation_towards
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.geometry.lens import LensModel
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, Recording, Source
 from stseg.io.untrusted.values import is_name
 
 BARREL = (-0.39, 0.25, 0.0008, -0.0017, -0.107)
 """A strong barrel, whose polynomial turns round about 48 degrees off the axis."""
-_DISTORTIONS = (BARREL, (-0.32, 0.048, 0.0012, -0.0006, 0.086), (0.12, 0.02, 0.0, 0.0, 0.0), (-0.1, 0.0, 0.0, 0.0, 0.0))
+FISHEYE = (-0.02, 0.015, -0.012, 0.002)
+LENSES: tuple[tuple[tuple[float, ...], LensModel], ...] = (
+    *(
+        (k, "pinhole")
+        for k in (BARREL, BARREL[:2], (-0.32, 0.048, 0.0012, -0.0006, 0.086), (0.12, 0.02, 0.001), (-0.1,))
+    ),
+    ((*BARREL, 0.3, 0.1, 0.02), "pinhole"),
+    (FISHEYE, "fisheye"),
+)
+"""Coefficients and models of lenses of all kinds."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +69,8 @@ def cameras(
 ) -> Camera:
     """Cameras that see the ground at `target`, half of them through a lens where `lenses` allows."""
     pose = draw(poses(size, target))
-    distortion = draw(st.sampled_from((None, *_DISTORTIONS))) if lenses else None
-    lens = None if distortion is None else Lens(pose.matrix, np.array(distortion))
+    chosen = draw(st.sampled_from((None, *LENSES))) if lenses else None
+    lens = None if chosen is None else Lens(pose.matrix, np.array(chosen[0]), chosen[1])
     scale = draw(st.sampled_from((1.0, -3.0, 1e-3)))
     return Camera.from_projection(name, size, pose.projection * scale, lens)
 

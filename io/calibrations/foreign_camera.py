@@ -10,11 +10,11 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError, InputError
 from stseg.geometry import Lens
+from stseg.geometry.lens import LensModel
+from stseg.io.lenses import checked_lens
 from stseg.io.toml import Table
-from stseg.io.untrusted import limits
 
-MOST_DISTORTION = 8
-"""Coefficients that a lens may have: k1, k2, p1, p2, k3, and k4, k5, k6 of the rational form."""
+_KEYS = {"matrix": "camera_matrix", "distortion": "distortion_coefficients"}
 _ORTHONORMAL = 0.01  # by which printed rotations may miss
 
 
@@ -53,13 +53,6 @@ class ForeignTable(Table):
         nested = isinstance(value, list) and any(isinstance(row, list) for row in value)
         return self.numbers(name, length, 1)[:, 0] if nested else self.numbers(name, length)
 
-    def image_size(self, name: str) -> tuple[int, int]:
-        """Width and height, pixels."""
-        width, height = self.numbers(name, 2).tolist()
-        if width != int(width) or height != int(height) or min(width, height) < 1 or width * height > limits.PIXELS:
-            raise self.error(name, [width, height], "width and height in whole pixels")
-        return int(width), int(height)
-
 
 def camera_from_pose(
     file: Path,
@@ -69,24 +62,24 @@ def camera_from_pose(
     rotation: Floats,
     translation: Floats,
     distortion: Floats,
+    model: LensModel = "pinhole",
 ) -> ForeignCamera:
-    """A camera P = K [R | t], with its lens unless the distortion is zero; file, name and size as in `ForeignCamera`.
+    """A camera P = K [R | t], with its lens unless that is none; file, name and size as in `ForeignCamera`.
 
     K, pixels, and R are float64 (3, 3), t float64 (3,) in lengths of the foreign world. The distortion is float64
-    (n,), OpenCV's coefficients; those beyond the first eight must be zero. FormatError where these are no camera
+    (n,), OpenCV's coefficients; those beyond the lens model's must be zero. FormatError where these are no camera
     matrix, no rotation, or too many coefficients; CalibrationError where R is a mirror.
     """
     key = f"camera {name}" if name else "camera"
-    if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:
-        raise FormatError(file, f"{key}, camera_matrix", matrix.tolist(), "[[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
+    lens = checked_lens(
+        matrix,
+        distortion,
+        model,
+        lambda name, *found: FormatError(file, f"{key}, {_KEYS[name]}", *found),
+    )
     if not np.abs(rotation @ rotation.T - np.eye(3)).max() <= _ORTHONORMAL:
         raise FormatError(file, f"{key}, rotation", np.round(rotation, 3).tolist(), "a rotation")
     if np.linalg.det(rotation) < 0:
         raise CalibrationError(file, f"{key}, rotation", "a mirror", "a rotation, which keeps left and right")
-    if distortion[MOST_DISTORTION:].any():
-        found = f"{len(distortion)} coefficients"
-        raise FormatError(file, f"{key}, distortion_coefficients", found, "at most 8: k1, k2, p1, p2, k3, k4, k5, k6")
     projection = matrix @ np.column_stack([rotation, translation])
-    kept = distortion[: MOST_DISTORTION if distortion[5:].any() else 5]
-    lens = Lens(matrix, kept) if distortion.any() else None
-    return ForeignCamera(file, name, size, projection, lens)
+    return ForeignCamera(file, name, size, projection, lens if distortion.any() or model == "fisheye" else None)

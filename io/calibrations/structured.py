@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
+from stseg.geometry.lens import LensModel
 from stseg.io.calibrations.foreign_camera import ForeignCamera, ForeignTable, camera_from_pose
 from stseg.io.extras import load_extra
 from stseg.io.toml import ANY, parse_toml
@@ -43,7 +44,7 @@ def read_pose_toml(files: Sequence[Path]) -> list[ForeignCamera]:
 
     aniposelib, FreeMoCap and Pose2Sim write them as `[cam_0]` beside `[metadata]`, caliscope as `[cameras.0]`.
 
-    FormatError where a file is no such TOML, or a lens is a fisheye.
+    FormatError where a file is no such TOML.
     """
     return [camera for file in files for camera in _poses(_table(file, parse_toml, "TOML"))]
 
@@ -54,14 +55,13 @@ def _poses(top: ForeignTable) -> Iterator[ForeignCamera]:
     if not tables:
         raise top.error("", "no camera", "tables with matrix, rotation and translation")
     for table in tables:
-        if table.values.get("fisheye"):
-            raise table.error("fisheye", "a fisheye lens", "OpenCV's k1, k2, p1, p2, k3: undistort its frames first")
+        model: LensModel = "fisheye" if table.values.get("fisheye") else "pinhole"
         name = str(table.values.get("name", table.values.get("cam_id", table.place.rpartition(".")[2])))
         size = table.image_size("size") if "size" in table else None
         rotation = np.asarray(Rotation.from_rotvec(table.vector("rotation", 3)).as_matrix())
         distortion = table.numbers("distortions", ANY) if "distortions" in table else np.zeros(5)
-        translation = table.vector("translation", 3)
-        yield camera_from_pose(top.file, name, size, table.matrix("matrix", 3, 3), rotation, translation, distortion)
+        translation, matrix = table.vector("translation", 3), table.matrix("matrix", 3, 3)
+        yield camera_from_pose(top.file, name, size, matrix, rotation, translation, distortion, model)
 
 
 def _is_camera(value: object) -> bool:
@@ -111,8 +111,8 @@ def _side(value: object) -> int | None:
 def read_kalibr_yaml(files: Sequence[Path]) -> list[ForeignCamera]:
     """Kalibr's camera chain: the world is the first camera's own, every other hangs on the one before it.
 
-    FormatError where a file is no such chain, or a lens is neither `radtan` nor `none`; ConfigError where PyYAML is not
-    installed.
+    FormatError where a file is no such chain, or a lens is none of `radtan`, `equidistant` and `none`; ConfigError
+    where PyYAML is not installed.
     """
     load: Callable[[str], object] = load_extra("yaml", "kalibr").safe_load
 
@@ -134,16 +134,18 @@ def _chain(top: ForeignTable) -> Iterator[ForeignCamera]:
     pose = np.eye(4)
     for index, name in enumerate(sorted(top.values, key=_number)):
         table = top.table(name)
-        model, lens = table.text("camera_model"), table.text("distortion_model")
-        if model != "pinhole" or lens not in ("radtan", "none"):
-            raise table.error("camera_model", f"{model}-{lens}", "pinhole-radtan: undistort its frames first")
+        camera, lens = table.text("camera_model"), table.text("distortion_model")
+        if camera != "pinhole" or lens not in ("radtan", "equidistant", "none"):
+            expected = "pinhole-radtan or pinhole-equidistant: undistort its frames first"
+            raise table.error("camera_model", f"{camera}-{lens}", expected)
         if index:
             pose = table.matrix("T_cn_cnm1", 4, 4) @ pose
         fu, fv, pu, pv = table.numbers("intrinsics", 4)
         matrix = np.array([[fu, 0, pu], [0, fv, pv], [0, 0, 1]])
         distortion: Floats = np.zeros(4) if lens == "none" else table.numbers("distortion_coeffs", 4)
         size = table.image_size("resolution")
-        yield camera_from_pose(top.file, name, size, matrix, pose[:3, :3], pose[:3, 3], distortion)
+        model: LensModel = "fisheye" if lens == "equidistant" else "pinhole"
+        yield camera_from_pose(top.file, name, size, matrix, pose[:3, :3], pose[:3, 3], distortion, model)
 
 
 def _number(name: str) -> tuple[int, str]:

@@ -97,22 +97,26 @@ def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False)
             f"cameras below the ground with {up} upwards",
             f"them above it: give {'' if mirrored else '--mirrored where the calibration is left-handed, or '}--up",
         )
-    return min(UNITS, key=lambda unit: abs(np.log(height * UNITS[unit] / _USUAL_HEIGHT)))
+    return _likeliest_unit(height)
 
 
 def require_median_height(cameras: Sequence[ForeignCamera], world: World) -> None:
-    """Refuse a unit with implausible camera heights where another gives plausible ones; raises CalibrationError."""
-    height = median_height(cameras, world)
-    if height <= 0 or CAMERA_HEIGHTS[0] <= height <= CAMERA_HEIGHTS[1]:
-        return
-    better = guess_unit(cameras, world.up, world.mirrored)
-    if CAMERA_HEIGHTS[0] <= height / world.metres * UNITS[better] <= CAMERA_HEIGHTS[1]:
-        raise CalibrationError(
-            cameras[0].file,
-            f"--unit {world.unit}",
-            f"cameras {height:.4g} m above the ground",
-            f"{CAMERA_HEIGHTS[0]} to {CAMERA_HEIGHTS[1]:.0f} m: are its lengths in {better}? (--unit {better})",
-        )
+    """`require_unit` of the cameras' median height."""
+    require_unit(cameras[0].file, "cameras", median_height(cameras, world), world)
+
+
+def require_unit(place: object, what: str, height: float, world: World) -> None:
+    """Refuse a unit with implausible camera heights, metres, where another gives plausible ones; CalibrationError."""
+    lowest, highest = CAMERA_HEIGHTS
+    better = _likeliest_unit(height / world.metres)
+    if height > 0 and not lowest <= height <= highest and lowest <= height / world.metres * UNITS[better] <= highest:
+        found = f"{what} {height:.4g} m above the ground"
+        expected = f"{lowest} to {highest:.0f} m: are its lengths in {better}? (--unit {better})"
+        raise CalibrationError(place, f"--unit {world.unit}", found, expected)
+
+
+def _likeliest_unit(height: float) -> str:
+    return min(UNITS, key=lambda unit: abs(np.log(max(height, 1e-300) * UNITS[unit] / _USUAL_HEIGHT)))
 
 
 def median_height(cameras: Sequence[ForeignCamera], world: World) -> float:

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.geometry import Lens
+from stseg.geometry.lens import LensModel
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.outputs.whole_files import MARK, write_file
 from stseg.io.untrusted import limits
@@ -38,19 +39,16 @@ _ROUNDS = 3
 
 
 def read_opencv_xml(files: Sequence[Path]) -> list[ForeignCamera]:
-    """One camera, P = K [R | t], with its lens unless the distortion is zero.
+    """One camera, P = K [R | t], with its lens unless that is none; a fisheye where `fisheye_model` is not 0.
 
     The nodes `camera_matrix`, `distortion_coefficients`, `rotation_vectors` or `rvec` (Rodrigues) and
     `translation_vectors` or `tvec` stand in one file, or are shared between two. FormatError where a file is no such
     XML, or a node is missing, twice there, or of the wrong length.
     """
     roots = [(file, parse_xml(file, "XML of OpenCV's FileStorage")) for file in files]
-    file, matrix = _numbers(roots, _MATRIX, (9,))
-    _, distortion = _numbers(roots, _DISTORTION, (4, 5, 8, 12, 14))
     _, rotation = _numbers(roots, _ROTATION, (3,))
     _, translation = _numbers(roots, _TRANSLATION, (3,))
-    turned = np.asarray(Rotation.from_rotvec(rotation).as_matrix())
-    return [camera_from_pose(file, "", None, matrix.reshape(3, 3), turned, translation, distortion)]
+    return [_camera(roots, rotation, translation)]
 
 
 def read_opencv_lens(file: Path) -> Lens:
@@ -58,11 +56,17 @@ def read_opencv_lens(file: Path) -> Lens:
 
     FormatError where the file is no such XML.
     """
-    roots = [(file, parse_xml(file, "XML of OpenCV's FileStorage"))]
-    _, matrix = _numbers(roots, _MATRIX, (9,))
+    alone = _camera([(file, parse_xml(file, "XML of OpenCV's FileStorage"))], np.zeros(3), np.zeros(3))
+    return alone.lens or Lens(alone.projection[:, :3], np.zeros(5))
+
+
+def _camera(roots: Sequence[tuple[Path, ElementTree.Element]], rotation: Floats, translation: Floats) -> ForeignCamera:
+    file, matrix = _numbers(roots, _MATRIX, (9,))
     _, distortion = _numbers(roots, _DISTORTION, (4, 5, 8, 12, 14))
-    alone = camera_from_pose(file, "", None, matrix.reshape(3, 3), np.eye(3), np.zeros(3), distortion)
-    return alone.lens or Lens(matrix.reshape(3, 3), np.zeros(5))
+    fisheye = any((root.findtext("fisheye_model") or "0").strip() != "0" for _, root in roots)
+    turned = np.asarray(Rotation.from_rotvec(rotation).as_matrix())
+    model: LensModel = "fisheye" if fisheye else "pinhole"
+    return camera_from_pose(file, "", None, matrix.reshape(3, 3), turned, translation, distortion, model)
 
 
 def write_opencv_lens(path: Path, matrix: Floats, distortion: Floats, overwrite: bool) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera
+from stseg.geometry.lens import COEFFICIENTS
 from stseg.io.recording.recording import HOG, BodyPrior, CameraSource, Recording, Source
 from stseg.io.toml import toml_string, toml_value
 
@@ -60,8 +61,9 @@ def _camera_lines(camera: Camera) -> list[str]:
     ]
     if camera.lens is not None:
         matrix, distortion = _rows(camera.lens.matrix), _list(camera.lens.distortion)
-        names = "k1, k2, p1, p2, k3" if len(camera.lens.distortion) == 5 else "k1, k2, p1, p2, k3, k4, k5, k6"
-        lines += [f"# camera matrix; {names}", f"lens = {{ matrix = {matrix}, distortion = {distortion} }}"]
+        model, names = camera.lens.model, COEFFICIENTS[camera.lens.model][: len(camera.lens.distortion)]
+        lines.append(f"# camera matrix; {', '.join(names)}")
+        lines.append(f'lens = {{ model = "{model}", matrix = {matrix}, distortion = {distortion} }}')
     return lines
 
 

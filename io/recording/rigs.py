@@ -16,7 +16,9 @@ import numpy as np
 
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.geometry.lens import LENS_MODELS
 from stseg.io.detections.tables import COLUMNS
+from stseg.io.lenses import checked_lens
 from stseg.io.outputs.whole_files import MARK, Inputs, require_output, write_file
 from stseg.io.recording.recording import (
     HOG,
@@ -188,7 +190,7 @@ def _bounds(table: Table, name: str) -> tuple[float, float]:
 def _camera(table: Table) -> Camera:
     table.allow(*_CAMERA_KEYS)
     name = table.text("name")
-    size = _size(table)
+    size = table.image_size("size")
     lens = _lens(table.table("lens")) if "lens" in table else None
     by_projection = "projection" in table
     if by_projection and ("ground" in table or "vertical" in table):
@@ -199,14 +201,6 @@ def _camera(table: Table) -> Camera:
         if by_projection:
             return Camera.from_projection(name, size, table.numbers("projection", 3, 4), lens)
         return Camera(name, size, table.numbers("ground", 3, 3), table.numbers("vertical", 3), lens)
-
-
-def _size(table: Table) -> tuple[int, int]:
-    size = table.numbers("size", 2)
-    if (size != size.round()).any() or (size < 1).any() or size.max() > limits.SIDE or size.prod() > limits.PIXELS:
-        expected = f"width and height in whole pixels, at most {limits.SIDE} each and {limits.PIXELS:.0e} pixels"
-        raise table.error("size", size.tolist(), expected)
-    return int(size[0]), int(size[1])
 
 
 @contextmanager
@@ -220,14 +214,9 @@ def _placed(table: Table, by_projection: bool) -> Iterator[None]:
 
 
 def _lens(table: Table) -> Lens:
-    table.allow("matrix", "distortion")
-    matrix = table.numbers("matrix", 3, 3)
-    if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:
-        raise table.error("matrix", matrix.tolist(), "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
-    distortion = table.numbers("distortion", ANY)
-    if len(distortion) > 8:
-        raise table.error("distortion", f"{len(distortion)} numbers", "at most 8: k1, k2, p1, p2, k3, k4, k5, k6")
-    return Lens(matrix, distortion)
+    table.allow("model", "matrix", "distortion")
+    model = table.choice("model", LENS_MODELS) if "model" in table else "pinhole"
+    return checked_lens(table.numbers("matrix", 3, 3), table.numbers("distortion", ANY), model, table.error)
 
 
 def _camera_source(table: Table) -> CameraSource:
@@ -264,7 +253,7 @@ def _source(table: Table, *more_keys: str) -> Source:
         tuple(more),
         tuple(table.numbers("starts", ANY).tolist()) if "starts" in table else (),
         classes=tuple(table.texts("classes")) if "classes" in table else (),
-        least_score=_share(table, "score") if "score" in table else 0.0,
+        least_score=table.within("score", (0.0, 1.0)) if "score" in table else 0.0,
         view=table.integer("view", 0, limits.CAMERAS) if "view" in table else None,
         select=table.text("select") if "select" in table else "",
         image_list=table.file.parent / table.text("image_list") if "image_list" in table else None,
@@ -281,13 +270,6 @@ def _detector(table: Table) -> Path:
         raise table.error("detector", found, "files that follow one another, or no detector")
     name = table.text("detector")
     return HOG if name == str(HOG) else table.file.parent / name
-
-
-def _share(table: Table, name: str) -> float:
-    value = float(table.numbers(name))
-    if not 0 <= value <= 1:
-        raise table.error(name, repr(value), "a number of 0..1")
-    return value
 
 
 def _columns(table: Table) -> tuple[tuple[str, str], ...]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.calibration.automatic.correspondence import Correspondences
 from stseg.calibration.automatic.solution import SolvedViews
 from stseg.calibration.bundle_adjustment import BundleParameters
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, SIZE, as_camera, height_of_head, moved, on_plane
@@ -43,42 +42,33 @@ class ViewReport:
 
 def scaled(solution: SolvedViews, factor: float) -> SolvedViews:
     """The solution with all lengths multiplied by a factor, covariance included."""
-    parameters, matched = solution.adjustment.parameters, solution.problem.correspondences
-    views = np.array([moved(view, 0.0, np.zeros(2), factor) for view in parameters.views])
-    scale = np.ones(len(solution.adjustment.covariance))
-    for view in range(len(views)):
-        scale[SIZE * view + CENTRE.start : SIZE * view + CENTRE.stop] = factor
-    scale[-2:] = factor
-    return _replaced(
-        solution,
-        replace(parameters, views=views, toe_offset=factor * parameters.toe_offset, points=factor * parameters.points),
-        scale[:, None] * solution.adjustment.covariance * scale,
-        replace(matched, ground=factor * matched.ground, velocity=factor * matched.velocity),
-        factor * solution.problem.height,
-    )
+    return _moved(solution, 0.0, np.zeros(2), factor)
 
 
 def centred(solution: SolvedViews) -> SolvedViews:
     """The solution with the origin in the middle of the ground points and x along the first camera's right."""
-    parameters, matched = solution.adjustment.parameters, solution.problem.correspondences
+    parameters = solution.adjustment.parameters
     middle = (parameters.points[:, :2].max(axis=0) + parameters.points[:, :2].min(axis=0)) / 2
     toward = middle - parameters.views[0, CENTRE][:2]
-    turn = np.pi / 2 - float(np.arctan2(toward[1], toward[0]))
-    about = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    views = np.array([moved(view, turn, -about @ middle, 1.0) for view in parameters.views])
-    points = np.column_stack([(parameters.points[:, :2] - middle) @ about.T, parameters.points[:, 2]])
-    turned = replace(matched, ground=(matched.ground - middle) @ about.T, velocity=matched.velocity @ about.T)
-    covariance = solution.adjustment.covariance
-    return _replaced(
-        solution, replace(parameters, views=views, points=points), covariance, turned, solution.problem.height
+    return _moved(solution, np.pi / 2 - float(np.arctan2(toward[1], toward[0])), middle, 1.0)
+
+
+def _moved(solution: SolvedViews, turn: float, middle: Floats, scale: float) -> SolvedViews:
+    """The solution turned about a middle, which becomes the origin, and scaled; the covariance is not turned."""
+    adjustment, matched = solution.adjustment, solution.problem.correspondences
+    about = scale * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    places = adjustment.parameters.points
+    points = np.column_stack([(places[:, :2] - middle) @ about.T, scale * places[:, 2]])
+    views = np.array([moved(view, turn, -about @ middle, scale) for view in adjustment.parameters.views])
+    stretch = np.ones(len(adjustment.covariance))
+    stretch[:-2].reshape(-1, SIZE)[:, CENTRE] = stretch[-2:] = scale
+    ground = replace(matched, ground=(matched.ground - middle) @ about.T, velocity=matched.velocity @ about.T)
+    adjustment = replace(
+        adjustment,
+        parameters=BundleParameters(views, scale * adjustment.parameters.toe_offset, points),
+        covariance=stretch[:, None] * adjustment.covariance * stretch,
     )
-
-
-def _replaced(
-    solution: SolvedViews, parameters: BundleParameters, covariance: Floats, matched: Correspondences, height: Floats
-) -> SolvedViews:
-    adjustment = replace(solution.adjustment, parameters=parameters, covariance=covariance)
-    problem = replace(solution.problem, correspondences=matched, height=height)
+    problem = replace(solution.problem, correspondences=ground, height=scale * solution.problem.height)
     return replace(solution, adjustment=adjustment, problem=problem)
 
 

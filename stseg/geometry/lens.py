@@ -1,18 +1,25 @@
-"""A lens: OpenCV's radial (polynomial or rational) and tangential model, with its fold.
+"""A lens: OpenCV's radial (polynomial or rational) and tangential model, or its fisheye, with its fold.
 
 Strong barrel distortion is a polynomial that turns round: far off-axis points come back into the image. The model
 means nothing there, so a point is rejected by its angle, beyond the first turning point of r (1 + k1 r^2 + ...).
+A fisheye's polynomial is one in the angle t = atan r: t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8). J. Kannala and
+S. Brandt, A generic camera model and calibration method, TPAMI 28(8), 2006.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from stseg.arrays import Flags, Floats
+from stseg.arrays import Complexes, Flags, Floats
 
+LensModel = Literal["pinhole", "fisheye"]
+LENS_MODELS: tuple[LensModel, ...] = get_args(LensModel)
+COEFFICIENTS = {"pinhole": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), "fisheye": ("k1", "k2", "k3", "k4")}
+"""Names of the numbers of `Lens.distortion`, by model."""
 _UNDISTORT_ROUNDS = 50
 
 
@@ -24,22 +31,26 @@ class Lens:
     ----------
     matrix : float64 (3, 3)
         Camera matrix, pixels.
-    distortion : float64 (5,) or (8,)
-        k1, k2, p1, p2, k3 of OpenCV's model, or those and the k4, k5, k6 of its rational form; shorter lists are
-        filled with zeros.
+    distortion : float64 (4,), (5,) or (8,)
+        k1, k2, p1, p2, k3 of OpenCV's model, or those and the k4, k5, k6 of its rational form; k1 to k4 of a fisheye.
+        Shorter lists are filled with zeros.
+    model
+        "fisheye" shows what lies less than 90 degrees off the axis.
     fold : float
         Tangent of the largest angle from the axis at which the radial function still rises.
     """
 
     matrix: Floats
     distortion: Floats
+    model: LensModel = "pinhole"
     fold: float = field(init=False)
 
     def __post_init__(self) -> None:
         given = np.asarray(self.distortion, float).ravel()
         object.__setattr__(self, "matrix", np.asarray(self.matrix, float).reshape(3, 3))
-        object.__setattr__(self, "distortion", _filled(given, 5 if len(given) <= 5 else 8))
-        object.__setattr__(self, "fold", _fold(self.distortion))
+        length = 4 if self.model == "fisheye" else 5 if len(given) <= 5 else 8
+        object.__setattr__(self, "distortion", _filled(given, length))
+        object.__setattr__(self, "fold", (_fisheye_fold if self.model == "fisheye" else _fold)(self.distortion))
 
     def distort(self, pixel: Floats) -> tuple[Floats, Flags]:
         """Where the lens shows undistorted pixels.
@@ -76,7 +87,7 @@ class Lens:
 
     def reduced(self, factor: int) -> Lens:
         """The lens of images reduced by a whole factor, each pixel the mean of a square."""
-        return Lens(reduction(factor) @ self.matrix, self.distortion)
+        return replace(self, matrix=reduction(factor) @ self.matrix)
 
     def _ray(self, pixel: Floats) -> Floats:
         offset = np.asarray(pixel, float) - self.matrix[:2, 2]
@@ -87,7 +98,7 @@ class Lens:
         return np.asarray(ray @ self.matrix[:2, :2].T + self.matrix[:2, 2])
 
     def _bend(self, ray: Floats) -> Floats:
-        _, _, p1, p2, *_ = self.distortion
+        p1, p2 = self._tangential
         x, y = ray[..., 0], ray[..., 1]
         square = x * x + y * y
         radial, _ = self._radial(square)
@@ -99,8 +110,17 @@ class Lens:
             -1,
         )
 
+    @property
+    def _tangential(self) -> tuple[float, float]:
+        return (0.0, 0.0) if self.model == "fisheye" else (float(self.distortion[2]), float(self.distortion[3]))
+
     def _radial(self, square: Floats) -> tuple[Floats, Floats]:
-        """Stretch N(s) / D(s) of a ray of squared radius s, and the slope of that in s."""
+        """Stretch of a ray of squared radius s, N(s) / D(s) but for a fisheye, and the slope of that in s."""
+        if self.model == "fisheye":
+            radius = np.sqrt(np.maximum(square, 1e-12))
+            bend, angle = _fisheye_angle(self.distortion), np.arctan(radius)
+            stretch = bend(angle) / radius
+            return stretch, (bend.deriv()(angle) / (1 + radius**2) - stretch) / (2 * radius**2)
         k1, k2, _, _, k3, *rational = self.distortion
         over = 1 + square * (k1 + square * (k2 + square * k3))
         rise = k1 + square * (2 * k2 + square * 3 * k3)
@@ -113,7 +133,7 @@ class Lens:
 
     def _slope(self, ray: Floats) -> Floats:
         """Jacobian of `_bend`, float64 (..., 2, 2)."""
-        _, _, p1, p2, *_ = self.distortion
+        p1, p2 = self._tangential
         x, y = ray[..., 0], ray[..., 1]
         square = x * x + y * y
         radial, slope = self._radial(square)
@@ -154,6 +174,21 @@ def _fold(distortion: Floats) -> float:
     over, under = Polynomial([1.0, k1, k2, k3]), Polynomial([1.0, k4, k5, k6])
     rise = over * under + Polynomial([0.0, 2.0]) * (over.deriv() * under - over * under.deriv())
     squares = np.concatenate([rise.trim().roots(), under.trim().roots()]).astype(complex)
-    real = squares[np.abs(squares.imag) < 1e-9].real
-    real = real[real > 0]
-    return float(np.sqrt(real.min())) if len(real) else float("inf")
+    return float(np.sqrt(_least_positive(squares)))
+
+
+def _fisheye_fold(distortion: Floats) -> float:
+    """Tangent of the least angle at which the image's radius stops rising; infinite where that is 90 degrees."""
+    angle = _least_positive(_fisheye_angle(distortion).deriv().trim().roots().astype(complex))
+    return float(np.tan(angle)) if angle < np.pi / 2 else float("inf")
+
+
+def _fisheye_angle(distortion: Floats) -> Polynomial:
+    """The angle off the axis at which a fisheye shows a ray, from the ray's own."""
+    k1, k2, k3, k4 = distortion
+    return Polynomial([0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4])
+
+
+def _least_positive(roots: Complexes) -> float:
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    return float(real[real > 0].min(initial=np.inf))

@@ -147,23 +147,24 @@ class LensTerms(NamedTuple):
     matrix : float64 (3, 3)
         Camera matrix, pixels.
     distortion : float64 (8,)
-        k1, k2, p1, p2, k3, k4, k5, k6; all 0 for an ideal image.
-    bends : bool
-        Whether there is a lens.
+        k1, k2, p1, p2, k3, k4, k5, k6, or k1 to k4 of a fisheye; all 0 for an ideal image.
+    bends, fisheye : bool
+        Whether there is a lens, and whether it is a fisheye.
     """
 
     matrix: Floats
     distortion: Floats
     bends: bool
+    fisheye: bool
 
     @classmethod
     def of(cls, lens: Lens | None) -> Self:
         """From a camera's lens."""
         distortion = np.zeros(8)
         if lens is None:
-            return cls(np.eye(3), distortion, False)
+            return cls(np.eye(3), distortion, False, False)
         distortion[: len(lens.distortion)] = lens.distortion
-        return cls(lens.matrix, distortion, True)
+        return cls(lens.matrix, distortion, True, lens.model == "fisheye")
 
 
 @part
@@ -186,8 +187,15 @@ def _bent(lens: LensTerms, u: float, v: float) -> tuple[float, float]:
     y = (v - matrix[1, 2]) / matrix[1, 1]
     x = (u - matrix[0, 2] - matrix[0, 1] * y) / matrix[0, 0]
     square = x * x + y * y
-    radial = 1 + square * (k1 + square * (k2 + square * k3))
-    radial /= 1 + square * (k4 + square * (k5 + square * k6))
+    if lens.fisheye:
+        radius = math.sqrt(max(square, 1e-12))
+        angle = math.atan(radius)
+        turn = angle * angle
+        radial = angle / radius * (1 + turn * (k1 + turn * (k2 + turn * (p1 + turn * p2))))  # p1, p2: its k3, k4
+        p1 = p2 = 0.0
+    else:
+        radial = 1 + square * (k1 + square * (k2 + square * k3))
+        radial /= 1 + square * (k4 + square * (k5 + square * k6))
     bent_x = x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x)
     bent_y = y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y
     bent_u = matrix[0, 0] * bent_x + matrix[0, 1] * bent_y + matrix[0, 2]

@@ -13,12 +13,13 @@ from refusals import refused
 from scenes import rotation_towards
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
-from strategies import BARREL
+from strategies import BARREL, FISHEYE
 
 from stseg.arrays import Floats
 from stseg.commands.calibrate.app import app
 from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
 from stseg.geometry import Camera
+from stseg.geometry.lens import LensModel
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.matrices import read_pom, read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
@@ -47,8 +48,8 @@ def pose(turn: float, metres: float = 1.0) -> tuple[Floats, Floats]:
     return np.asarray(Rotation.from_matrix(rotation).as_rotvec()), -rotation @ centre / metres
 
 
-def expected(turn: float, distortion: Floats) -> Floats:
-    return project_by_opencv(MATRIX, distortion, *pose(turn), POINTS)
+def expected(turn: float, distortion: Floats, model: LensModel = "pinhole") -> Floats:
+    return project_by_opencv(MATRIX, distortion, *pose(turn), POINTS, model)
 
 
 def pixels(foreign: ForeignCamera, world: World) -> Floats:
@@ -64,14 +65,15 @@ def krt(path: Path) -> Path:
     return path
 
 
-def pose_toml(path: Path, header: str, size: bool = True) -> Path:
+def pose_toml(path: Path, header: str, size: bool = True, lens: Floats = DISTORTION) -> Path:
     """Cameras in centimetres under `[cam_0]` or `[cameras.0]`."""
     lines = ["[metadata]", "adjusted = false", "error = 0.3", ""]
     for k in range(3):
         rotation, translation = pose(k, 0.01)
         lines += [f"[{header}{k}]", f'name = "view{k}"', *([f"size = {list(SIZE)}"] if size else [])]
-        lines += [f"matrix = {MATRIX.tolist()}", f"distortions = {DISTORTION.tolist()}"]
-        lines += [f"rotation = {rotation.tolist()}", f"translation = {translation.tolist()}", "fisheye = false", ""]
+        lines += [f"matrix = {MATRIX.tolist()}", f"distortions = {lens.tolist()}"]
+        lines += [f"rotation = {rotation.tolist()}", f"translation = {translation.tolist()}"]
+        lines += [f"fisheye = {str(len(lens) == 4).lower()}", ""]
     path.write_text("\n".join(lines))
     return path
 
@@ -98,7 +100,7 @@ class TestStructured:
         [
             (read_krt_json, krt, np.zeros(5), "m"),
             (read_pose_toml, lambda path: pose_toml(path, "cam_"), DISTORTION, "cm"),
-            (read_pose_toml, lambda path: pose_toml(path, "cameras."), DISTORTION, "cm"),
+            (read_pose_toml, lambda path: pose_toml(path, "cameras.", lens=np.array(FISHEYE)), np.array(FISHEYE), "cm"),
             (read_nvidia_json, nvidia, np.zeros(5), "m"),
         ],
     )
@@ -114,7 +116,8 @@ class TestStructured:
         assert [camera.size for camera in cameras] == [SIZE] * 3
         assert (guess_unit(cameras, guess_up(cameras)), guess_up(cameras)) == (unit, "+z")
         for k, camera in enumerate(cameras):
-            np.testing.assert_allclose(pixels(camera, World(unit)), expected(k, distortion), rtol=0, atol=1e-6)
+            want = expected(k, distortion, "fisheye" if len(distortion) == 4 else "pinhole")
+            np.testing.assert_allclose(pixels(camera, World(unit)), want, rtol=0, atol=1e-6)
 
     def test_names_are_the_files(self, tmp_path: Path) -> None:
         assert [camera.name for camera in read_krt_json([krt(tmp_path / "c.json")])] == ["0", "1", "2"]
@@ -124,7 +127,11 @@ class TestStructured:
     @pytest.mark.parametrize(
         ("old", "new", "complaint"),
         [
-            ("fisheye = false", "fisheye = true", r"cam_0.fisheye: found a fisheye lens"),
+            (
+                "fisheye = false",
+                "fisheye = true",
+                r"distortion_coefficients: found 5 coefficients, expected at most 4: k1",
+            ),
             ("[[500.0,", '[["500.0",', r"cam_0.matrix: found .* expected 3 rows of 3 numbers"),
             ("[[500.0,", "[[-500.0,", r"camera view0, camera_matrix"),
             ("rotation =", "rot =", r"no camera"),
@@ -155,13 +162,15 @@ class TestStructured:
                 lines += ["  T_cn_cnm1:", *(f"  - {row}" for row in step.tolist())]
         path = tmp_path / "camchain.yaml"
         path.write_text("\n".join(lines))
-        cameras = read_kalibr_yaml([path])
-        for k, camera in enumerate(cameras):
-            in_world = ForeignCamera(path, "", SIZE, camera.projection @ poses[0], camera.lens)
-            want = expected(k, np.array(BARREL[:4]))
-            np.testing.assert_allclose(pixels(in_world, World()), want, rtol=0, atol=1e-6)
-        path.write_text(path.read_text().replace("radtan", "equidistant"))
-        refused(FormatError, r"cam0.camera_model: found pinhole-equidistant", read_kalibr_yaml, [path])
+        models: tuple[tuple[str, LensModel], ...] = (("radtan", "pinhole"), ("equidistant", "fisheye"))
+        for word, model in models:
+            path.write_text(path.read_text().replace("radtan", word))
+            for k, camera in enumerate(read_kalibr_yaml([path])):
+                in_world = ForeignCamera(path, "", SIZE, camera.projection @ poses[0], camera.lens)
+                want = expected(k, np.array(BARREL[:4]), model)
+                np.testing.assert_allclose(pixels(in_world, World()), want, rtol=0, atol=1e-6)
+        path.write_text(path.read_text().replace("equidistant", "equi"))
+        refused(FormatError, r"cam0.camera_model: found pinhole-equi, .*pinhole-equidistant", read_kalibr_yaml, [path])
 
 
 def tsai_pixels(file: Path, points: Floats) -> Floats:

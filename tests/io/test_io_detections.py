@@ -208,7 +208,7 @@ def test_the_rig_names_a_wrong_key(tmp_path: Path) -> None:
     (own,) = read_recording(path).sources
     assert own.source.classes == ("person",) and own.source.least_score == 0.3 and own.images is not None
     assert read_recording(path).pictured().sources[0].source.kind == "video"
-    for wrong, message in (("score = 3", "a number of 0..1"), ('columns = { frme = "t" }', "did you mean frame")):
+    for wrong, message in (("score = 3", "a number from 0 to 1"), ('columns = { frme = "t" }', "did you mean frame")):
         refused(RigError, message, read_recording, write_rig(tmp_path, old, new.replace("SOURCE", wrong)))
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera
-from stseg.geometry.rig import CAMERA_HEIGHTS
 
 MIN_POINTS = 4
 """Least number of ground points of a homography."""
@@ -78,33 +77,6 @@ def mirrored_points_error(name: str) -> CalibrationError:
         "a mirrored ground: left and right are exchanged between its points and the image",
         "x and y as seen from above, u to the right, v down: are two columns exchanged, or one counted backwards?",
     )
-
-
-def require_camera_height(camera: Camera, unit: str, metres: dict[str, float]) -> None:
-    """Refuse a unit that gives an implausible camera height where another unit gives a plausible one.
-
-    Parameters
-    ----------
-    unit
-        The assumed unit of its points.
-    metres
-        Metres in each known unit.
-
-    Raises
-    ------
-    CalibrationError
-    """
-    height = float(camera.centre[2])
-    if CAMERA_HEIGHTS[0] <= height <= CAMERA_HEIGHTS[1]:
-        return
-    for other, length in metres.items():
-        if CAMERA_HEIGHTS[0] <= height / metres[unit] * length <= CAMERA_HEIGHTS[1]:
-            raise CalibrationError(
-                f"camera {camera.name}",
-                f"--unit {unit}",
-                f"a camera {height:.4g} m above the ground",
-                f"{CAMERA_HEIGHTS[0]} to {CAMERA_HEIGHTS[1]:.0f} m: are its points in {other}? (--unit {other})",
-            )
 
 
 def all_but_one_on_line(points: Floats) -> bool:

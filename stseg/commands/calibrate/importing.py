@@ -20,6 +20,7 @@ from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
 from stseg.io.untrusted.values import one_of
+from stseg.tasks.calibration.automatic import camera_names
 
 
 def import_calibration(
@@ -112,21 +113,13 @@ def _named(cameras: Sequence[ForeignCamera], files: Sequence[str], given: str | 
     elif all(camera.name for camera in cameras):
         names = [camera.name for camera in cameras]
     else:
-        names = _file_names([Path(file.partition("+")[0]) for file in files])
+        names = camera_names([Path(file.partition("+")[0]) for file in files])
+        if len(set(names)) < len(names):
+            raise ConfigError("--names", "", "files and folders that share their names", "a name for each camera")
         if len(names) != len(cameras):
             found = f"{len(cameras)} cameras in {len(names)} files, not all with a name"
             raise ConfigError("--names", "", found, "a name for each camera")
     return [replace(camera, name=name) for camera, name in zip(cameras, names, strict=True)]
-
-
-def _file_names(files: Sequence[Path]) -> list[str]:
-    stems = [file.stem for file in files]
-    if len(set(stems)) == len(stems):
-        return stems
-    folders = [file.absolute().parent.name for file in files]
-    if len(set(folders)) == len(folders):
-        return folders
-    raise ConfigError("--names", "", "files and folders that share their names", "a name for each camera")
 
 
 def _world(cameras: Sequence[ForeignCamera], unit: str | None, up: str | None, mirrored: bool) -> World:

@@ -11,12 +11,11 @@ import numpy as np
 
 from stseg.arrays import Ints
 from stseg.calibration.points.point_fit import PointFit, Points, fit_points
-from stseg.calibration.points.point_requirements import require_camera_height
 from stseg.engine.recordings import AnySource, camera_source
 from stseg.errors import ConfigError
 from stseg.geometry import Grid, Rig
 from stseg.io.calibrations.point_files import read_points
-from stseg.io.calibrations.world_frame import UNITS
+from stseg.io.calibrations.world_frame import UNITS, World, require_unit
 from stseg.io.calibrations.xml_files import read_opencv_lens
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Recording
@@ -103,7 +102,7 @@ def calibrate_points(
         known_lens = None if lens_file is None else read_opencv_lens(lens_file)
         metres = table.place * UNITS[unit]
         fits.append(fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), known_lens))
-        require_camera_height(fits[-1].camera, unit, UNITS)
+        require_unit(f"camera {table.camera}", "a camera", float(fits[-1].camera.centre[2]), World(unit))
     names = [table.camera for table in tables]
     rig = Rig(scene or output.stem, frame_rate, grid, tuple(fit.camera for fit in fits))
     recording = Recording(output, rig, tuple(map(camera_source, _sources(sources, names))))
