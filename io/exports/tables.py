@@ -15,18 +15,8 @@ from stseg.io.outputs.whole_files import MARK, Inputs, replacing, require_output
 from stseg.io.runfile.reading.run_reader import Run
 from stseg.io.track_csv import write_tracks_csv
 
-_UNITS = {
-    "x": "m",
-    "y": "m",
-    "z": "m",
-    "xx": "m2",
-    "xy": "m2",
-    "yy": "m2",
-    "height": "m",
-    "extent": "m2",
-    "score": "nat",
-    "time": "s",
-}
+_UNITS = dict.fromkeys(("x", "y", "z", "height"), "m") | dict.fromkeys(("xx", "xy", "yy", "extent"), "m2")
+_UNITS |= {"score": "nat", "time": "s"}
 
 
 def write_csv(path: Path, run: Run) -> None:

@@ -12,10 +12,6 @@ from stseg.commands.report import report
 from stseg.commands.run import run
 from stseg.commands.simulate import simulate
 from stseg.errors import OutputError
-from stseg.io.recording.rigs import read_recording
-from stseg.io.runfile.runs import read_run
-from stseg.io.track_csv import read_tracks_csv
-from stseg.tasks.report import write_pictures
 
 
 def demo(folder: Path = Path("stseg-demo"), /, *, overwrite: Annotated[bool, Parameter(negative="")] = False) -> None:
@@ -38,11 +34,9 @@ def demo(folder: Path = Path("stseg-demo"), /, *, overwrite: Annotated[bool, Par
     simulate(scene, scene="demo", overwrite=overwrite)
     run(scene / "rig.toml", output=run_file, overwrite=overwrite)
     evaluate(run_file, scene / "truth.csv")
-    report(run_file, output=page, truth=scene / "truth.csv", camera_images=True, overwrite=overwrite)
     # People are simulated, so camera images may be shown.
-    found, truth = read_run(run_file), read_tracks_csv(scene / "truth.csv")
-    middle = int(found.frames[len(found.frames) // 2])
-    write_pictures(folder / "pictures", read_recording(scene / "rig.toml"), found, truth, middle, camera_images=True)
+    truth, pictures = scene / "truth.csv", folder / "pictures"
+    report(run_file, output=page, truth=truth, pictures=pictures, camera_images=True, overwrite=overwrite)
     print(_what_to_open(folder))
 
 

@@ -29,7 +29,7 @@ def measure(
     Example: stseg measure night.h5 --zones zones.geojson --lines lines.geojson -o measures/
 
     **zones**: mean and most people, entries, exits, dwell times, density of each zone; **people**: each zone in each
-    frame, with the mean and standard deviation of the count by the tracks' scores; **visits**: each stay; **lines** and
+    frame, with mean and standard deviation of its count by scores and places; **visits**: each stay; **lines** and
     **crossings**: each direction (left and right as seen along the line); **tracks**: distance and speeds; **spacing**:
     distances between people; **field**: density, speed and flow on a grid, drawn in flow.png.
 

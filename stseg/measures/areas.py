@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit, ndtr
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.geometry.grid import inside_polygon
@@ -23,6 +24,13 @@ class Zone:
         for ring in self.rings:
             inside ^= inside_polygon(ground, ring)
         return inside
+
+    def probability(self, trajectory: Rows) -> Floats:
+        """Probability that each row is inside, float64 (n,), by its covariance and the nearest edge."""
+        ground = np.stack([trajectory["x"], trajectory["y"]], -1)
+        edges = [Line("", np.append(ring, ring[:1], axis=0)).distance(ground) for ring in self.rings]
+        away = np.min(edges, axis=0) / np.sqrt(np.maximum(trajectory["xx"] + trajectory["yy"], 1e-12) / 2)
+        return np.asarray(ndtr(np.where(self.contains(ground), away, -away)))
 
     @property
     def area(self) -> float:
@@ -45,10 +53,11 @@ class Line:
 
     def distance(self, ground: Floats) -> Floats:
         """Distance of each ground point (n, 2) from the line, metres, float64 (n,)."""
-        start, way = self.points[:-1], np.diff(self.points, axis=0)
-        length = np.maximum((way**2).sum(axis=1), 1e-12)
-        along = np.clip(((ground[:, None] - start) * way).sum(axis=2) / length, 0, 1)
-        return np.asarray(np.linalg.norm(ground[:, None] - start - along[..., None] * way, axis=2).min(axis=1))
+        nearest = np.full(len(ground), np.inf)
+        for start, way in zip(self.points, np.diff(self.points, axis=0), strict=False):
+            along = np.clip((ground - start) @ way / max(way @ way, 1e-12), 0, 1)
+            nearest = np.minimum(nearest, np.hypot(*(ground - start - along[:, None] * way).T))
+        return nearest
 
 
 @dataclass(frozen=True)
@@ -63,13 +72,15 @@ COUNT = np.dtype(
     [("frame", "<i8"), ("time", "<f8"), ("zone", "O"), ("people", "<i8"), ("expected", "<f8"), ("deviation", "<f8"),
      ("density", "<f8")]
 )  # fmt: skip
-"""One row per zone and frame: number of tracks; its mean and standard deviation by the tracks' scores; people a square
-metre."""
+"""One row per zone and frame: number of tracks; its mean and standard deviation by the tracks' scores and the errors of
+their places, and by people missed or made up; people a square metre."""
 VISIT = np.dtype(
     [("zone", "O"), ("id", "<i8"), ("first", "<i8"), ("last", "<i8"), ("start", "<f8"), ("dwell", "<f8"),
      ("entered", "?"), ("left", "?")]
 )  # fmt: skip
 """One row per stay of a track in a zone: frames, seconds; whether the track was seen outside before and after."""
+LASTING_SHARE = 0.05
+"""Standard deviation of a count by errors that last: people missed or made up, and shifted cameras; share of it."""
 AWAY = 5.0
 """Gap of a track from which its person was away, seconds."""
 
@@ -77,19 +88,28 @@ AWAY = 5.0
 def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -> Rows:
     """People in a zone in every frame of a run, COUNT (time,).
 
-    A track exists with probability 1 / (1 + exp(-score)) of its row, independently of the others; the count's mean and
-    variance are the sums of p and p (1 - p).
+    A track exists with probability 1 / (1 + exp(-score)) of its row, and is inside with that of its place,
+    independently of the others; the count's mean is the sum of their products p, its variance that of p (1 - p) and of
+    the square of LASTING_SHARE of the mean.
     """
-    inside = trajectory[zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))]
-    index = np.searchsorted(frames, inside["frame"])
-    exists = 1 / (1 + np.exp(-np.clip(inside["score"].astype(float), -50, 50)))
+    index = np.searchsorted(frames, trajectory["frame"])
+    inside = zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))
+    present = expit(trajectory["score"].astype(float)) * zone.probability(trajectory)
     rows = np.zeros(len(frames), COUNT)
     rows["frame"], rows["time"], rows["zone"] = frames, frames / frame_rate, zone.name
-    rows["people"] = np.bincount(index, minlength=len(frames))
-    rows["expected"] = np.bincount(index, exists, len(frames))
-    rows["deviation"] = np.sqrt(np.bincount(index, exists * (1 - exists), len(frames)))
+    rows["people"] = np.bincount(index[inside], minlength=len(frames))
+    rows["expected"] = np.bincount(index, present, len(frames))
+    brief = np.bincount(index, present * (1 - present), len(frames))
+    rows["deviation"] = np.sqrt(brief + (LASTING_SHARE * rows["expected"]) ** 2)
     rows["density"] = rows["people"] / max(zone.area, 1e-9)
     return rows
+
+
+def mean_deviation(counts: Rows, frame_rate: float) -> float:
+    """Standard deviation of a mean of COUNT rows: errors last about a second, those of LASTING_SHARE all along."""
+    lasting, frames = LASTING_SHARE * counts["expected"], max(len(counts), 1)
+    brief = (counts["deviation"] ** 2 - lasting**2).sum() * max(frame_rate, 1.0)
+    return float(np.hypot(np.sqrt(max(brief, 0.0)), lasting.sum())) / frames
 
 
 def zone_visits(zone: Zone, trajectory: Rows, frame_rate: float, patience: float) -> Rows:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.geometry import Grid
-from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, zone_counts, zone_visits
+from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, mean_deviation, zone_counts, zone_visits
 from stseg.measures.motion import flow_field, spacings, track_measures
 
 ZONE = np.dtype(
@@ -17,8 +17,7 @@ ZONE = np.dtype(
      ("entries", "<i8"), ("exits", "<i8"), ("visits", "<i8"), ("mean_dwell", "<f8"), ("median_dwell", "<f8"),
      ("mean_density", "<f8")]
 )  # fmt: skip
-"""One row per zone: square metres, people, standard deviation of the mean by the scores, seconds, people a square
-metre."""
+"""One row per zone: square metres, people, standard deviation of their mean, seconds, people a square metre."""
 LINE = np.dtype([("line", "O"), ("left", "<i8"), ("right", "<i8"), ("per_minute", "<f8"), ("mean_speed", "<f8")])
 """One row per line: crossings to each side, crossings a minute, metres a second."""
 
@@ -75,7 +74,8 @@ def measure_tracks(
     people = [zone_counts(zone, trajectory, frames, frame_rate) for zone in areas.zones]
     visits = [zone_visits(zone, trajectory, frame_rate, patience) for zone in areas.zones]
     crossings = [line_crossings(line, trajectory, frame_rate, band) for line in areas.lines]
-    zones = [_zone(z.name, z.area, count, stays) for z, count, stays in zip(areas.zones, people, visits, strict=True)]
+    shapes = zip(areas.zones, people, visits, strict=True)
+    zones = [_zone(z.name, z.area, count, stays, mean_deviation(count, frame_rate)) for z, count, stays in shapes]
     minutes = max(len(frames) / frame_rate / 60, 1e-9)
     lines = [
         (line.name, (crossed["to"] == "left").sum(), (crossed["to"] == "right").sum(), len(crossed) / minutes,
@@ -94,8 +94,7 @@ def measure_tracks(
     )
 
 
-def _zone(name: str, area: float, people: Rows, visits: Rows) -> tuple[object, ...]:
-    deviation = float(np.sqrt((people["deviation"] ** 2).sum())) / max(len(people), 1)
+def _zone(name: str, area: float, people: Rows, visits: Rows, deviation: float) -> tuple[object, ...]:
     counts = (_of(people["people"], np.mean), deviation, people["people"].max(initial=0))
     dwell = (_of(visits["dwell"], np.mean), _of(visits["dwell"], np.median))
     return (

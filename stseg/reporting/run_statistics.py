@@ -14,6 +14,10 @@ DOUBT_LIMIT = 0.9
 """Probability below which a point is doubtful."""
 BUSY_DURATION = 600.0
 """Length of a run from which its busiest minutes are shown separately, seconds."""
+_EXCHANGE_RATE, _RATE_NEAR_ENDS, _RATE_OF_ABSENCE = 0.058, 0.044, 0.15
+"""Exchanges of a track, by each track that begins or ends near it, and by each second in which it has no row."""
+_END_DISTANCE, _BORDER_WIDTH = 1.5, 0.5
+"""Distance from such an end, and of such ends from the border, metres."""
 _MINUTE, _HOUR = 60.0, 3600.0  # seconds
 
 
@@ -44,6 +48,24 @@ def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
     sums, counts = np.bincount(place, _probability(trajectory), len(ids)), np.bincount(place, minlength=len(ids))
     means = dict(zip(ids.tolist(), (sums / np.maximum(counts, 1)).tolist(), strict=True))
     return np.array([means.get(int(track), np.nan) for track in tracks["id"]])
+
+
+def exchange_chances(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> Floats:
+    """Chance that each of `tracks` shows another person for a second or more, float64 (n,), 0..1.
+
+    That is more likely where another track begins or ends near it, away from the border float64 (2, 2) (the lower and
+    the upper corner of the ground, metres), and while nobody was seen; the rates are of perturbed runs of recordings.
+    """
+    rows = trajectory[np.lexsort((trajectory["id"], trajectory["frame"]))]
+    rate = _EXCHANGE_RATE + _RATE_OF_ABSENCE * (tracks["last"] - tracks["first"] + 1 - tracks["frames"]) / frame_rate
+    for name in ("first", "last"):
+        for track in tracks[(tracks[name] > rows["frame"][:1]) & (tracks[name] < rows["frame"][-1:])]:
+            people = rows[slice(*np.searchsorted(rows["frame"], [track[name], track[name] + 1]))]
+            ground, end = np.stack([people["x"], people["y"]], -1), people["id"] == track["id"]
+            if end.any() and (np.minimum(ground[end] - border[0], border[1] - ground[end]) > _BORDER_WIDTH).all():
+                neighbours = ~end & (np.hypot(*(ground - ground[end][0]).T) < _END_DISTANCE)
+                rate += _RATE_NEAR_ENDS * np.isin(tracks["id"], people["id"][neighbours])
+    return np.asarray(-np.expm1(-rate), float)
 
 
 def doubtful_stretches(trajectory: Rows) -> list[DoubtfulStretch]:

@@ -7,12 +7,11 @@ from html import escape
 from pathlib import Path
 
 from stseg.arrays import Bytes
-from stseg.engine.reporter import Progress, Reporter, reporter_of
-from stseg.io.outputs.whole_files import Inputs
+from stseg.engine.reporter import Progress, Reporter
 from stseg.io.runfile.runs import Run
 from stseg.reporting.figures import ground_figures
 from stseg.reporting.page.html import data_uri, png_bytes
-from stseg.tasks.report import film, require_outputs
+from stseg.tasks.report import report
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,6 @@ def write_film(
     progress: Progress | Reporter | None,
 ) -> FilmFile:
     """Write the film of a run, as `stseg report --video` does."""
-    path = Path(output)
-    require_outputs(None, None, path, None, overwrite, Inputs(run.files))
-    film(run, path, frames, camera_images, reporter_of(progress), overwrite)
-    return FilmFile(path)
+    return FilmFile(
+        *report(run, video=output, frames=frames, camera_images=camera_images, overwrite=overwrite, progress=progress)
+    )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Bytes, Ints, Observation, Rows
+from stseg.arrays import Bytes, Ints, Observation
 from stseg.engine.offline.frame_range import frames_of_run
 from stseg.engine.recordings import run_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
@@ -21,7 +21,7 @@ from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.reporting.figures import Figure, Instant, RunFilm, camera_figures, ground_figures, slice_figures
+from stseg.reporting.figures import Figure, Instant, RunFilm, camera_figures, slice_figures
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.page.page import report_page
 from stseg.tasks.report_contents import page_contents
@@ -131,13 +131,16 @@ def write_report(
     """Write the page and its pictures, see `report`; the files that were written."""
     rows = None if truth is None else read_tracks_csv(truth)
     true = None if rows is None else rows[np.isin(rows["frame"], run.frames)]
-    instants = _read_instants(run, run.recording, _frames(run, frame), camera_images)
+    frames = _frames(run, frame)
+    views = read_views(run.recording, frames) if camera_images and frames else {}
+    unseen = (None,) * len(run.cameras)
+    instants = [Instant(frame, *run.read_frame(frame), views.get(frame, unseen)) for frame in frames]
     contents = page_contents(run, true, instants, bool(frame), camera_images)
     write_page(output, report_page(contents), overwrite)
     if pictures is None:
         return [output]
     drawn = instants if frame else instants[len(instants) // 2 :][:1]
-    still = [*contents.still, *_named(run.recording, run, drawn)]
+    still = [*contents.still, *_named(run, drawn)]
     return [output, *write_figures(pictures, still, overwrite, inputs)]
 
 
@@ -155,40 +158,6 @@ def film(
     return write_film(output, _film_pictures(run, drawn, numbers, camera_images, reporter), run.frame_rate, overwrite)
 
 
-def write_pictures(
-    folder: Path, recording: Recording, run: Run, truth: Rows | None, frame: int, camera_images: bool = False
-) -> list[Path]:
-    """Write the report's pictures as PNG files, replacing older ones.
-
-    Parameters
-    ----------
-    folder
-        Made where it is not there.
-    recording
-        The rig and its streams; these are read with `camera_images` alone.
-    truth : (m,) with frame, id, x, y, or None
-    frame
-        The frame that slices and cameras show.
-    camera_images
-        Whether the overlays show the cameras' frames.
-
-    Returns
-    -------
-    list of Path
-        plan.png, spacetime.png, slices.png, marginal.png and overlay_CAMERA.png for each camera.
-
-    Raises
-    ------
-    OutputError
-        Where they cannot be written.
-    SourceError
-        Where the cameras' frames are asked for and cannot be read.
-    """
-    instants = _read_instants(run, recording, [frame], camera_images)
-    ground = ground_figures(recording.rig, run.views, run.trajectory, truth, run.names)
-    return write_figures(folder, [*ground, *_named(recording, run, instants)], True, Inputs(run.files))
-
-
 def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
     """The frames to show, in order of time."""
     numbers = run.frames.tolist()
@@ -202,23 +171,17 @@ def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
     return sorted({numbers[index] for index in middles.tolist()})
 
 
-def _read_instants(run: Run, recording: Recording, frames: Sequence[int], camera_images: bool) -> list[Instant]:
-    unseen = (None,) * len(recording.rig.cameras)
-    views = read_views(recording, frames) if camera_images and frames else {}
-    return [Instant(frame, *run.read_frame(frame), views.get(frame, unseen)) for frame in frames]
-
-
 def read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[Observation, ...]]:
     """Observations of these frames, which are in order, by frame."""
     with open_frames(recording.pictured(), frames[0], frames[-1] + 1) as frame_sets:
         return {frame_set.frame: frame_set.views for frame_set in frame_sets if frame_set.frame in frames}
 
 
-def _named(recording: Recording, run: Run, instants: Sequence[Instant]) -> list[Figure]:
+def _named(run: Run, instants: Sequence[Instant]) -> list[Figure]:
     """Figures of these frames; where there are several, the frame is part of the name."""
-    figures = []
+    rig, figures = run.recording.rig, []
     for instant in instants:
-        drawn = [*slice_figures(recording.rig, instant), *camera_figures(recording.rig, run.trajectory, instant)]
+        drawn = [*slice_figures(rig, instant), *camera_figures(rig, run.trajectory, instant)]
         ending = f"_{instant.frame}" if len(instants) > 1 else ""
         figures += [replace(figure, name=figure.name + ending) for figure in drawn]
     return figures

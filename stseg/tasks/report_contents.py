@@ -19,7 +19,14 @@ from stseg.reporting.page.embedded import embedded_json, thin_sheets
 from stseg.reporting.page.page import Contents, ViewSummary
 from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, flow_map, heat_map
 from stseg.reporting.pictures.plan import plan_view
-from stseg.reporting.run_statistics import BUSY_DURATION, Span, busiest_minutes, ground_by_views, people_by_hour
+from stseg.reporting.run_statistics import (
+    BUSY_DURATION,
+    Span,
+    busiest_minutes,
+    exchange_chances,
+    ground_by_views,
+    people_by_hour,
+)
 from stseg.tasks.overview import seconds_by_stage
 
 _FLOW = 0.5
@@ -59,6 +66,7 @@ def page_contents(
         span=span,
         trajectory=trajectory,
         tracks=run.tracks,
+        exchanges=exchange_chances(trajectory, run.tracks, run.frame_rate, np.array([rig.grid.x, rig.grid.y]).T),
         events=run.events,
         candidates=len(run.ghosts),
         ghosts=ghosts,

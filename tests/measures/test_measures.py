@@ -62,13 +62,22 @@ def test_the_way_from_exit_to_entrance_is_nobodys() -> None:
     assert track["distance"] == pytest.approx(3.0) and track["seconds"] == pytest.approx(3.2)
 
 
-def test_counts_have_the_uncertainty_of_scores() -> None:
+def test_counts_have_the_uncertainty_of_scores_and_places() -> None:
     still = [walk(k, np.zeros(50), 0.1 * k, score=0.0) for k in range(4)]
     found = measure_tracks(np.concatenate(still), np.arange(50), 10.0, GRID, Areas((Zone("z", (SQUARE,)),)))
     assert found.people["people"].tolist() == [4] * 50
     np.testing.assert_allclose(found.people["expected"], 2.0)
-    np.testing.assert_allclose(found.people["deviation"], 1.0)
+    np.testing.assert_allclose(found.people["deviation"], np.hypot(1.0, 0.05 * 2.0), err_msg="and of people missed")
     np.testing.assert_allclose(found.spacing["nearest"], 0.1)
+    border = walk(1, np.repeat([0.95, 1.0, 1.1, 4.0], 10))
+    border["xx"] = border["yy"] = 0.1**2
+    found = measure_tracks(border, np.arange(40), 10.0, GRID, Areas((Zone("z", (SQUARE,)),)))
+    np.testing.assert_allclose(found.people["expected"][::10], [0.691, 0.5, 0.159, 0.0], atol=1e-3)
+    inside = found.people["expected"] @ np.ones(40) / 40
+    brief = (found.people["expected"] * (1 - found.people["expected"])).sum() * 10.0 / 40**2
+    assert found.zones["deviation"][0] == pytest.approx(np.hypot(np.sqrt(brief), 0.05 * inside), abs=1e-3)
+    edge = Line("", np.concatenate([SQUARE, SQUARE[:1]]))
+    np.testing.assert_allclose(edge.distance(np.array([[0.0, 0.0], [0.9, 0.2], [2.0, 2.0]])), [1.0, 0.1, np.sqrt(2)])
 
 
 def test_short_absences_do_not_end_a_visit_and_holes_are_outside() -> None:

@@ -10,7 +10,7 @@ from run_files import table_of, trajectory_of
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
-from stseg.records.tables import TRACK, TRAJECTORY
+from stseg.records.tables import TRACK, TRAJECTORY, Tracks
 from stseg.reporting.charts import clock_time, people_chart, track_chart
 from stseg.reporting.pictures.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
 from stseg.reporting.pictures.plan_map import PlanMap
@@ -18,6 +18,7 @@ from stseg.reporting.run_statistics import (
     Span,
     busiest_minutes,
     doubtful_stretches,
+    exchange_chances,
     ground_by_views,
     mean_certainty,
     people_by_hour,
@@ -75,6 +76,18 @@ def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
     svg = track_chart(Span(0, 40, 5.0), tracks, found)
     assert svg.count('class="pale"') == 4
     assert "track 1, frames 3 to 4: 50 % certain" in svg
+
+
+def test_exchanges_are_likelier_near_ends_and_after_absence() -> None:
+    walks = [(frame, track, x, 0.0) for track, x in ((1, 3.0), (2, 8.0)) for frame in range(40)]
+    late = [(frame, 3, 4.0, 0.0) for frame in range(20, 40)]  # begins inside, a metre from the first
+    at_border = [(frame, 4, 9.8, 0.0) for frame in range(20, 40)]
+    away = [(frame, 5, 5.0, 4.0) for frame in (*range(10), *range(30, 40))]
+    rows = trajectory_of(*walks, *late, *at_border, *away)
+    tracks = Tracks(rows).summary()
+    chances = exchange_chances(rows, tracks, 10.0, np.array([[0.0, -5.0], [10.0, 5.0]]))
+    assert chances[1] == chances[2] == chances[3] < chances[0] < chances[4] < 1
+    assert exchange_chances(rows[:0], tracks[:0], 10.0, np.zeros((2, 2))).shape == (0,)
 
 
 def test_clock_times() -> None:

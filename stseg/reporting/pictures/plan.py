@@ -80,18 +80,10 @@ def draw_ground(canvas: Bytes, plan: PlanMap, rig: Rig) -> None:
 
 def plan_map(rig: Rig, width: int = 1400, height: int = 1500, least_width: int = LEGEND_WIDTH) -> PlanMap:
     """The map from metres to pixels of `plan_view`."""
-    positions = [_ground_position(camera, rig.grid) for camera in rig.cameras]
-    places = [place for place in positions if place is not None]
-    return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height, least_width)
-
-
-def _ground_position(camera: Camera, grid: Grid) -> Floats | None:
-    """Ground position of a camera, metres (x, y), None where that is far away."""
-    place = camera.centre[:2]
-    reach = _CAMERA_DISTANCE * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
-    low, high = np.array([grid.x[0], grid.y[0]]), np.array([grid.x[1], grid.y[1]])
-    distance = np.maximum(low - place, place - high).max()
-    return place if distance <= reach else None
+    low, high = np.array([rig.grid.x, rig.grid.y]).T
+    places = np.array([camera.centre[:2] for camera in rig.cameras]).reshape(-1, 2)
+    is_near = np.maximum(low - places, places - high).max(axis=1) <= _CAMERA_DISTANCE * (high - low).max()
+    return PlanMap.fit(rig.grid, places[is_near], width, height, least_width)
 
 
 def _shade(canvas: Bytes, plan: PlanMap, grid: Grid, coverage: Bytes) -> None:
@@ -235,7 +227,9 @@ def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> 
     """Below the plan: what the tones and marks mean, and a scale bar."""
     u, v = 76.0, plan.size[1] - 38.0
     if most is not None:
-        u = _legend_of_tones(canvas, (u, v), most) + 28
+        text(canvas, "views", (u, v), QUIET, 15, (0, 0.5))
+        place = u + text_size("views", 15)[0] + 10, v
+        u = legend_of_tones(canvas, place, [_tone(count, max(most, 1)) for count in range(most + 1)]) + 28
     colour = track_colour(1)
     line = np.array([[u, v], [u + 46, v]])
     stroke(canvas, line, colour, 3)
@@ -248,17 +242,15 @@ def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> 
     scale_bar(canvas, plan, (plan.size[0] - 44.0, v))
 
 
-def _legend_of_tones(canvas: Bytes, place: tuple[float, float], most: int) -> float:
+def legend_of_tones(canvas: Bytes, place: tuple[float, float], tones: Sequence[Colour]) -> float:
     """A square for each number of views from `place` on; returns where they end."""
     u, v = place
-    text(canvas, "views", (u, v), QUIET, 15, (0, 0.5))
-    u += text_size("views", 15)[0] + 10
-    wide = min(30.0, 270.0 / (most + 1))
-    for count in range(most + 1):
+    wide = min(30.0, 300.0 / len(tones))
+    for count, tone in enumerate(tones):
         square = np.array([[u, v - 14], [u + wide, v - 14], [u + wide, v + 14], [u, v + 14]])
-        fill(canvas, square, _tone(count, max(most, 1)))
+        fill(canvas, square, tone)
         outline(canvas, square, mixed(QUIET, PAPER, 0.5))
-        if wide > 20 or count in (0, most):
-            text(canvas, str(count), (u + wide / 2, v), INK, 14, (0.5, 0.5))
+        if wide > 20 or count in (0, len(tones) - 1):
+            text(canvas, str(count), (u + wide / 2, v), PAPER if sum(tone) < 320 else INK, 14, (0.5, 0.5))
         u += wide
     return u
