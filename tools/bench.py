@@ -15,7 +15,6 @@ fails after twenty: load passes, a loss stays. `start` is the CPU time until the
 
 from __future__ import annotations
 
-import argparse
 import csv
 import os
 import subprocess
@@ -27,7 +26,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from workbench import ROOT, commit
+from workbench import ROOT, command_line, commit
 
 from stseg.io.outputs.simulated_scene import write_scene
 from stseg.simulation import NAMED, SceneFilm, SceneSpec
@@ -39,7 +38,7 @@ _ATTEMPTS = 20
 """How many rounds a check that fails is measured."""
 _CALIBRATED = 2.0
 """CPU seconds of a calibration: long enough to meet the load that a run of seconds meets."""
-_RUN = "import sys; from stseg.commands.main import main; sys.exit(main())"
+RUN = "import sys; from stseg.commands.main import main; sys.exit(main())"
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ def cpu_of_run(checkout: Path, rig: Path, output: Path, frames: int) -> float:
     words = ["run", str(rig), "-o", str(output), "--frames", f"0:{frames}", "--overwrite", "--workers", "1"]
     environment = os.environ | {"PYTHONPATH": str(checkout)}
     process = subprocess.Popen(
-        [sys.executable, "-P", "-c", _RUN, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        [sys.executable, "-P", "-c", RUN, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     )
     assert process.stderr is not None
     messages = process.stderr.read().decode()
@@ -157,8 +156,7 @@ def record(rows: Sequence[tuple[str, float, float]]) -> None:
 
 def main() -> None:
     """Measure, print, and record or check."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--work", type=Path, required=True, help="folder for recordings and run files")
+    parser = command_line(__doc__)
     parser.add_argument("--base", type=Path, help="another checkout to compare with")
     parser.add_argument("--workloads", default="", help="names, by comma; all if not given")
     parser.add_argument("--rounds", type=int, default=4, help="repetitions, of which the median counts")
@@ -172,10 +170,8 @@ def main() -> None:
     names = [name for name in asked.workloads.split(",") if name]
     checkouts = [ROOT] if asked.base is None else [ROOT, asked.base.resolve()]
     rows = []
-    print(
-        f"{'workload':10} {'ms/frame set':>12} {'ratio':>8}"
-        + ("" if asked.base is None else f" {'base':>8} {'gain':>6}")
-    )
+    beside = "" if asked.base is None else f" {'base':>8} {'gain':>6}"
+    print(f"{'workload':10} {'ms/frame set':>12} {'ratio':>8}{beside}")
     for workload in workloads():
         if names and workload.name not in names:
             continue

@@ -1,8 +1,14 @@
-"""Truth of public data sets in the table that `stseg evaluate` reads: metres, frames from 0."""
+"""Truth of public data sets in the table that `stseg evaluate` reads: metres, frames from 0.
+
+python tools/datasets.py cmc-truth GT_CMC1_WORLD_CENTROID.txt TABLE.csv
+python tools/datasets.py wildtrack-truth annotations_positions TABLE.csv
+python tools/datasets.py wildtrack-boxes annotations_positions FOLDER        a table a view
+"""
 
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -57,3 +63,12 @@ def _wildtrack_people(folder: Path) -> Iterator[tuple[int, dict[str, Any]]]:
     for path in sorted(folder.glob("*.json")):
         for person in json.loads(path.read_text(encoding="utf-8")):
             yield int(path.stem) // 5, person
+
+
+if __name__ == "__main__":
+    _, what, source, output = sys.argv
+    if what == "wildtrack-boxes":
+        wildtrack_annotated_boxes(Path(source), Path(output))
+    else:
+        truth = {"cmc-truth": cmc_truth, "wildtrack-truth": wildtrack_truth}[what](Path(source))
+        write_truth_csv(Path(output), truth, overwrite=True)

@@ -1,7 +1,7 @@
 """Faults of the system at every call of a run, and kills at random moments: what was injected, survived and lost.
 
-python tools/faults.py -o build/faults.md      each fault at each call that writes, and 100 kills
-python tools/faults.py --every 32 --kills 20              at every 32nd write, and at each call of any other kind
+python tools/faults.py                            each fault at each call that writes, and 100 kills
+python tools/faults.py --every 32 --kills 20      at every 32nd write, and at each call of any other kind
 
 A fault is survived if the command ends with a whole output or with one line, and the same command then gives the same
 datasets, bit for bit. Anything else is lost.
@@ -9,15 +9,16 @@ datasets, bit for bit. Anything else is lost.
 
 from __future__ import annotations
 
-import argparse
 import errno
 import random
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
+
+from workbench import command_line, write_table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
@@ -71,11 +72,9 @@ def at_random(driver: Driver, whole: Path, seconds: float, kills: int, scratch: 
 
 def _count(row: Row, driver: Driver, status: int, output: Path, whole: Path, what: str) -> None:
     row.injected += 1
-    row.ended, row.refused, row.killed = (
-        row.ended + (status == 0),
-        row.refused + (status == 2),
-        row.killed + (status < 0),
-    )
+    row.ended += status == 0
+    row.refused += status == 2
+    row.killed += status < 0
     was_whole = not output.exists() or _is_same(output, whole)
     if {path.name for path in output.parent.iterdir()} != {"run.h5"}:
         driver.run(output)
@@ -93,28 +92,11 @@ def _is_same(output: Path, whole: Path) -> bool:
     return True
 
 
-def table(rows: Sequence[Row], calls: Sequence[str], every: int) -> str:
-    """The page."""
-    kinds = ", ".join(f"{calls.count(kind)} {kind}" for kind in dict.fromkeys(calls))
-    lines = [
-        "# Faults injected", "",
-        f"Made by `python {' '.join(['tools/faults.py', *sys.argv[1:]])}`. A fault is survived if the command ends",
-        "with a whole output or with one line, and the same command then gives the same datasets, bit for bit; else it",
-        "is lost.", "",
-        f"A run of 12 frames of three cameras in two segments makes {len(calls)} calls that write: {kinds}.",
-        f"Each fault strikes at each of them{f', of the writes at every {every}th' if every > 1 else ''}.", "",
-        "| fault | injected | run ended whole | one line | killed | lost |", "| --- | --- | --- | --- | --- | --- |",
-        *(f"| {r.fault} | {r.injected} | {r.ended} | {r.refused} | {r.killed} | {r.lost} |" for r in rows),
-    ]  # fmt: skip
-    return "\n".join(lines) + "\n"
-
-
 def main() -> int:
     """The command line; status 1 where something was lost."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--every", type=int, default=1, help="writes from one fault to the next")
     parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("-o", "--output", type=Path)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -129,10 +111,9 @@ def main() -> int:
         rows = [at_random(driver, whole, seconds, given.kills, folder)]
         rows += [at_calls(driver, whole, calls, fault, given.every, folder) for fault in FAULTS]
         driver.close()
-    page = table(rows, calls, given.every)
-    print(page)
-    if given.output is not None:
-        given.output.write_text(page, "utf-8")
+    print(f"{len(calls)} calls that write: {', '.join(f'{calls.count(kind)} {kind}' for kind in dict.fromkeys(calls))}")
+    head = ["fault", "injected", "run ended whole", "one line", "killed", "lost"]
+    write_table(given.output / "faults.csv", [head, *map(astuple, rows)])
     return 1 if any(row.lost for row in rows) else 0
 
 

@@ -7,11 +7,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from result_variants import VARIANTS, Variant
-
 from stseg.simulation import NAMED
 
-__all__ = ["SETS", "ResultSet"]
+__all__ = ["SETS", "VARIANTS", "ResultSet", "Variant"]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One variant of tracking: a tracker, and perhaps the constant by which it differs from that tracker's defaults."""
+
+    name: str
+    tracker: str
+    setting: str = ""
+    colour: bool = False
+    """Whether it needs colour images."""
+
+    @property
+    def options(self) -> str:
+        """Of `stseg run`."""
+        return f"--tracker {self.tracker}" + (f" --set {self.setting}" if self.setting else "")
+
+
+VARIANTS = {
+    variant.name: variant
+    for variant in (
+        Variant("cut", "cut"),
+        Variant("frames", "frames"),
+        Variant("kalman", "kalman"),
+        Variant("particles", "particles", colour=True),
+        Variant("particles-search", "particles", "particles.method=search", True),
+        Variant("particles-generic", "particles", "particles.method=generic", True),
+        Variant("belief", "belief", colour=True),
+        Variant("belief-condensation", "belief", "belief.method=condensation", True),
+    )
+}
+"""In the order of the tables."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +137,7 @@ def _cmc(name: str, foreground: str, boxes: str, people: str) -> ResultSet:
         (
             f"stseg calibrate import matrix $DATA/cmc/cam?_cam_mat.mat -o $WORK/{name}.toml {_CMC} --source-kind boxes "
             f"--source-pattern {boxes} --overwrite",
-            f"python tools/result_inputs.py cmc-truth $DATA/cmc/GT_CMC{number}_WORLD_CENTROID.txt $WORK/{name}.csv",
+            f"python tools/datasets.py cmc-truth $DATA/cmc/GT_CMC{number}_WORLD_CENTROID.txt $WORK/{name}.csv",
         ),
         truth=f"$WORK/{name}.csv",
         scoring=_CMC_AREA,
@@ -117,7 +147,7 @@ def _cmc(name: str, foreground: str, boxes: str, people: str) -> ResultSet:
 
 
 def _wildtrack(name: str, foreground: str, folder: str, *inputs: str) -> ResultSet:
-    truth = "python tools/result_inputs.py wildtrack-truth $DATA/wildtrack/annotations_positions $WORK/wildtrack.csv"
+    truth = "python tools/datasets.py wildtrack-truth $DATA/wildtrack/annotations_positions $WORK/wildtrack.csv"
     return ResultSet(
         name,
         foreground,
@@ -213,7 +243,7 @@ _ALL = (
         "wildtrack_annotated",
         "annotated boxes: a check of geometry alone",
         "$WORK/wildtrack_annotated",
-        "python tools/result_inputs.py wildtrack-boxes $DATA/wildtrack/annotations_positions $WORK/wildtrack_annotated",
+        "python tools/datasets.py wildtrack-boxes $DATA/wildtrack/annotations_positions $WORK/wildtrack_annotated",
     ),
     ResultSet(
         "pom",

@@ -11,18 +11,15 @@ after a change to the simulator.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 from measure import prepare
-from result_sets import SETS, ResultSet
-from result_variants import VARIANTS, Variant
-from workbench import ROOT, Bench, commit
+from result_sets import SETS, VARIANTS, ResultSet, Variant
+from workbench import ROOT, Bench, command_line, commit
 
 from stseg.io.runfile.runs import read_run
 
@@ -97,9 +94,7 @@ def _scores(row: Row | None) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure the sets that are asked for, then write the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
-    parser.add_argument("--work", type=Path, default=ROOT / "build/results")
+    parser = command_line(__doc__)
     parser.add_argument("--sets", default=",".join(SETS), help="names of sets; none for the page alone")
     parser.add_argument("--variants", default=",".join(VARIANTS), help=f"of {', '.join(VARIANTS)}")
     parser.add_argument("--jobs", type=int, default=1, help="runs at once")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
+import csv
 import shlex
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "docs" / "results"
 _PROGRAMS = {
     "stseg": [sys.executable, "-c", "import sys; from stseg.commands.main import main; sys.exit(main())"],
     "python": [sys.executable],
@@ -46,6 +49,21 @@ class Bench:
         if "?" not in argument:
             return [filled]
         return sorted(str(path) for path in Path("/").glob(filled.lstrip("/"))) or [filled]
+
+
+def command_line(text: str | None) -> argparse.ArgumentParser:
+    """A command line with its help, and the folders that most tools work with."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=ROOT / "../shared/data", help="folder of data sets")
+    parser.add_argument("--work", type=Path, default=ROOT / "build/results", help="folder for what is made")
+    parser.add_argument("-o", "--output", type=Path, default=RESULTS, metavar="FOLDER", help="of the tables")
+    return parser
+
+
+def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
+    """Write a table of results."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 def commit() -> str:

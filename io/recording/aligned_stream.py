@@ -21,7 +21,7 @@ from stseg.arrays import Floats, Ints, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.recording.recording import CameraSource, Recording
-from stseg.io.recording.streams import Stream, open_stream
+from stseg.io.recording.streams import CountedStream, Stream, open_stream
 from stseg.io.recording.time_alignment import align_in_time, visible_ranges, with_alignment
 from stseg.io.recording.video.time_stamps import pack_stamps, unpack_stamps
 
@@ -84,6 +84,11 @@ class AlignedStream:
         """Set the alignment of the stream's frames, and so its end."""
         self.source = source
         self.end = source.offset + (frames if source.frame_at_tick is None else len(source.frame_at_tick))
+
+    def filled_frames(self) -> Ints | None:
+        """Frames of the recording in which the stream holds a detection, rising; None where that is not known."""
+        frames = self._stream.filled if isinstance(self._stream, CountedStream) else None
+        return None if frames is None or self.source.frame_at_tick is not None else frames + self.source.offset
 
     def close(self) -> None:
         self._stream.close()
@@ -166,15 +171,22 @@ class StreamIndex:
     """int64 (tick,) or None each: `CameraSource.frame_at_tick` of each camera."""
     notes: tuple[str, ...] = ()
     """Messages for the user, one line each."""
+    filled: tuple[tuple[int, int], ...] | None = None
+    """Half-open stretches beyond which no camera has a detection; None where that is not known."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         packed = tuple(tuple(map(pack_stamps, files)) for files in self.times)
-        return _unpacked, (self.length, packed, self.frame_at_tick, self.notes)
+        return _unpacked, (self.length, packed, self.frame_at_tick, self.notes, self.filled)
 
     def visible_ranges(self, recording: Recording) -> list[Ints]:
         """The frames of the indexed recording that each camera shows, half-open ranges, int64 (range, 2)."""
         counts = [sum(map(len, files)) for files in self.times]
         return visible_ranges(with_alignment(recording, self.frame_at_tick), counts, self.length)
+
+    def filled_ranges(self, recording: Recording) -> list[Ints]:
+        """As `visible_ranges`, without long stretches in which no camera has a detection."""
+        ranges = self.visible_ranges(recording)
+        return [np.clip(one, *within) for one in ranges for within in self.filled or [(0, self.length)]]
 
     def multi_view_range(self, recording: Recording) -> tuple[int, int]:
         """First and stop of the part that at least two cameras show; all of it where a camera is required throughout.
@@ -238,5 +250,17 @@ def index_from_times(
         streams = streams or open_aligned_streams(recording, opened)
         for stream, source, files in zip(streams, aligned.sources, times, strict=True):
             stream.align(source, sum(map(len, files)))
-        length = int(recording_length(streams))
-    return StreamIndex(length, tuple(map(tuple, times)), alignment.frame_at_tick, alignment.notes)
+        length, filled = int(recording_length(streams)), _filled_stretches(streams, recording.rig.frame_rate)
+    return StreamIndex(length, tuple(map(tuple, times)), alignment.frame_at_tick, alignment.notes, filled)
+
+
+def _filled_stretches(streams: Sequence[AlignedStream], frame_rate: float) -> tuple[tuple[int, int], ...] | None:
+    """Stretches with detections, an hour or more apart, and a minute before and after each; None if not known."""
+    found, minute = [stream.filled_frames() for stream in streams], round(60 * frame_rate)
+    known = [frames for frames in found if frames is not None]
+    if len(known) < len(found) or not any(map(len, known)):
+        return None
+    frames = np.unique(np.concatenate(known))
+    last = np.append(np.diff(frames) >= 60 * minute, True)
+    begins, ends = frames[np.roll(last, 1)] - minute, frames[last] + minute + 1
+    return tuple(zip(np.maximum(begins, 0).tolist(), ends.tolist(), strict=True))

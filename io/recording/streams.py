@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from stseg.arrays import Floats, Observation
+from stseg.arrays import Floats, Ints, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.detections.source_detections import instance_image, read_source
@@ -40,8 +40,10 @@ class Stream(Protocol):
 class CountedStream:
     """Frames of known number that have no time stamps, each given by `read_frame`; nothing is held open."""
 
-    def __init__(self, frames: int, read_frame: Callable[[int], Observation]) -> None:
+    def __init__(self, frames: int, read_frame: Callable[[int], Observation], filled: Ints | None = None) -> None:
         self._frames, self._read_frame, self._next = frames, read_frame, 0
+        self.filled = filled
+        """int64 (frame,), rising: the frames that hold a detection; None where that is not known."""
 
     def skip(self, count: int) -> int:
         """Skip up to `count` frames; return how many there were."""
@@ -64,7 +66,7 @@ class CountedStream:
 def open_boxes(source: Source, camera: Camera) -> CountedStream:
     """Boxes of a file or folder of detections, read whole at once; raises as `open_stream` does."""
     table = read_source(source, camera.size).table
-    return CountedStream(table.frames or 0, table.at)
+    return CountedStream(table.frames or 0, table.at, np.unique(table.frame))
 
 
 def open_masks(source: Source, camera: Camera) -> CountedStream:
@@ -74,7 +76,7 @@ def open_masks(source: Source, camera: Camera) -> CountedStream:
     def read_frame(number: int) -> Observation:
         return instance_image(found.kept, np.flatnonzero(found.kept.frame == number).tolist(), camera.size)
 
-    return CountedStream(found.frames, read_frame)
+    return CountedStream(found.frames, read_frame, np.unique(found.kept.frame))
 
 
 def open_images(source: Source, camera: Camera, factor: int) -> CountedStream:

@@ -7,7 +7,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.terminal.standard_error import frame_bar
 from stseg.tasks import correction
 
 
@@ -46,7 +45,6 @@ def correct(
     overwrite
         Replace the file if it exists.
     """
-    with frame_bar("correcting", None):
-        found = correction.correct(run_file, answers, output, overwrite=overwrite)
+    found = correction.correct(run_file, answers, output, overwrite=overwrite)
     changed = sum(answer.action != "keep" for answer in found.answers)
     print(f"wrote {output}: {len(found.answers)} answers, {changed} changes; {len(found.run.tracks)} tracks")

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from stseg.arrays import Ints, Rows
-from stseg.commands.terminal.standard_error import frame_bar, warn
+from stseg.commands.terminal.standard_error import warn
 from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
 from stseg.evaluation import Scores
@@ -67,11 +67,10 @@ def evaluate(
     """
     asked_frames = None if frames is None else _frames(frames)
     asked_area = None if area is None else _area(area)
-    with frame_bar("scoring", None):
-        rows, trajectory = read_tracks_csv(truth), _read(tracks)
-        scores = score(rows, trajectory, gate, asked_area, asked_frames, ignore_flagged, align)
-        advice = reading_advice(rows, trajectory, gate) if 2 * scores.hits < scores.truths else ""
-    warn([advice] if advice else [])
+    rows, trajectory = read_tracks_csv(truth), _read(tracks)
+    scores = score(rows, trajectory, gate, asked_area, asked_frames, ignore_flagged, align)
+    if 2 * scores.hits < scores.truths and (advice := reading_advice(rows, trajectory, gate)):
+        warn([advice])
     if as_json:
         print(json.dumps(scores.as_dict(), indent=1))
     else:

@@ -8,7 +8,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.terminal.standard_error import frame_bar
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
 from stseg.io.exports.archive import ARCHIVES
@@ -63,7 +62,7 @@ def export(
     if to in ARCHIVES:
         _archive(to, output, [contents, *others], overwrite)
         return
-    with frame_bar("writing", None), replacing(output, overwrite) as part:
+    with replacing(output, overwrite) as part:
         write_tracks(to, part, contents)
     print(f"wrote {len(contents.trajectory)} rows of {len(contents.tracks)} tracks to {output}")
 

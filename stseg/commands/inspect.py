@@ -11,7 +11,6 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.commands.terminal.standard_error import frame_bar
 from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
@@ -71,8 +70,7 @@ def inspect(
     if slice_ is not None and output is not None:
         print(f"wrote {output}: {write_slice(found, slice_, output, overwrite)}")
         return
-    with frame_bar("summarising", None):
-        overview = summarise_run(found)
+    overview = summarise_run(found)
     if as_json:
         print(json.dumps(asdict(overview), indent=1))
     else:

@@ -14,7 +14,7 @@ from typing import Literal, NoReturn
 
 from cyclopts import App, CycloptsError, MissingArgumentError
 
-from stseg.commands.terminal.standard_error import without_library_messages
+from stseg.commands.terminal.standard_error import patience, without_library_messages
 from stseg.commands.terminal.termination import INTERRUPTED, TERMINATED, Termination
 from stseg.engine.workers.garbage import collect_rarely
 from stseg.errors import ConfigError, StsegError
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status; a user's error is one line on standard error."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     _require_streams()
-    with without_library_messages():
+    with without_library_messages(), patience():
         return _run(tokens)
 
 

@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 from rich.table import Table
 
-from stseg.commands.terminal.standard_error import frame_bar
 from stseg.commands.terminal.standard_output import output_console
 from stseg.measures.measure import Measures
 from stseg.tasks import measures
@@ -50,8 +49,7 @@ def measure(
     overwrite
         Replace tables that exist.
     """
-    with frame_bar("measuring", None):
-        found = measures.measure(run_file, zones, lines, output=output, format_=format_, overwrite=overwrite)
+    found = measures.measure(run_file, zones, lines, output=output, format_=format_, overwrite=overwrite)
     _print(found)
     print(f"wrote {len(found.tables())} tables and flow.png to {output}")
 

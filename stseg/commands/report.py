@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.terminal.standard_error import TerminalReporter, frame_bar
+from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.answers import read_names
 from stseg.io.outputs.whole_files import Inputs
@@ -72,8 +72,7 @@ def report(
     if names is not None:
         run = run.with_names(read_names(names))
     if output is not None:
-        with frame_bar("drawing", None):
-            written = reports.write_report(run, output, truth, frame, pictures, camera_images, overwrite, inputs)
+        written = reports.write_report(run, output, truth, frame, pictures, camera_images, overwrite, inputs)
         for path in written:
             print(f"wrote {path}")
     if video is not None:

@@ -7,7 +7,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.terminal.standard_error import frame_bar
 from stseg.errors import ConfigError
 from stseg.tasks.review import write_review
 
@@ -44,6 +43,5 @@ def review(
     """
     if most < 1:
         raise ConfigError("--most", "", most, "1 or more questions")
-    with frame_bar("searching", None):
-        count = write_review(run_file, output, most=most, camera_images=camera_images, overwrite=overwrite)
+    count = write_review(run_file, output, most=most, camera_images=camera_images, overwrite=overwrite)
     print(f"wrote {output}: {count} questions")

@@ -206,7 +206,7 @@ def _make_segments(job: Job, folder: WorkFolder, workforce: Workforce, reporter:
     """All segments of a job in the order of time; the missing ones are made."""
     plan, finished = job.segments(), folder.segments()
     for begin, end in job.gaps():
-        reporter.note(f"no camera shows frames {begin} to {end - 1}: a gap, at which all tracks end")
+        reporter.note(f"no camera shows anything in frames {begin} to {end - 1}: a gap, at which all tracks end")
     if not plan:
         found = f"{job.first}:{job.stop}, which no camera shows"
         raise ConfigError("--frames", "", found, "a part that some camera shows")

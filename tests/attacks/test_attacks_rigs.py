@@ -16,8 +16,11 @@ from fuzz.corpus import mat_file
 from recordings import COMMAND, process
 from refusals import Command, refused
 
+from stseg.config import Config
+from stseg.engine.offline.job import Job
 from stseg.errors import InputError, SourceError
 from stseg.io.calibrations.matlab_file import parse_mat
+from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.source_files import source_parts
@@ -66,6 +69,16 @@ def test_three_thousand_cameras_are_refused(tmp_path: Path, refusal: Command) ->
     path = write_rig(tmp_path)
     path.write_text(RIG[: RIG.index("[[camera]]")] + cameras)
     assert "at most 256" in refusal("run", path, "-o", tmp_path / "q.h5")
+
+
+def test_a_row_far_behind_all_others_costs_nothing(tmp_path: Path) -> None:
+    recording = read_recording(write_rig(tmp_path))
+    with (tmp_path / "boxes.csv").open("a") as file:
+        file.write("40000,10,10,5,20\n19999999,10,10,5,20\n")
+    streams = index_streams(recording)
+    job = Job(recording, Config(), "cut", "all", 0, streams.length, streams)
+    assert job.gaps() == [(604, 39400), (40601, 19999399)]
+    assert sum(segment.stop - segment.first for segment in job.segments()) == 604 + 1201 + 601
 
 
 def test_a_polygon_of_a_thousand_corners_works(tmp_path: Path) -> None:

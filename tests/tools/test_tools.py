@@ -21,8 +21,7 @@ import datasets  # noqa: E402
 import measure  # noqa: E402
 import pom_rig  # noqa: E402
 import results  # noqa: E402
-from result_sets import SETS  # noqa: E402
-from result_variants import VARIANTS  # noqa: E402
+from result_sets import SETS, VARIANTS  # noqa: E402
 
 
 def test_cmc_counts_frames_from_one(tmp_path: Path) -> None:

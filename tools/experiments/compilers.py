@@ -11,28 +11,27 @@ runs differ. CPU seconds are printed beside: with an empty NUMBA_CACHE_DIR they 
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+from bench import RUN
 from result_sets import SETS
-from workbench import ROOT, Bench
+from workbench import ROOT, Bench, command_line
 
 from experiments.same import differences, digests
 from stseg.io.runfile.runs import read_run
 
 _TOLERANCE = 1e-3
 """Largest difference of the tracks of two versions of numba, metres."""
-_COMMAND = "import sys; from stseg.commands.main import main; sys.exit(main())"
 
 
 def start(python: str, words: list[str], **environment: str) -> subprocess.Popen[bytes]:
     """Start a command of stseg by an interpreter."""
     return subprocess.Popen(
-        [python, "-c", _COMMAND, *words],
+        [python, "-c", RUN, *words],
         env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 
@@ -66,9 +65,7 @@ def prepared(bench: Bench) -> tuple[Path, str]:
 
 def main() -> None:
     """Compare, a line for each way."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--work", type=Path, required=True, help="folder for the rig, the scene and the run files")
-    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
+    parser = command_line(__doc__)
     parser.add_argument("--rig", type=Path)
     parser.add_argument("--frames", help="all frames of --rig, if not given; of the recording 0:40, of the scene 0:12")
     parser.add_argument("--python", help="an interpreter with another version of numba")

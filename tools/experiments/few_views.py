@@ -1,15 +1,16 @@
 """Two and three views of everything: scores, and how many of its points the run itself takes for wrong.
 
-    python tools/experiment.py few_views -o build/few_views.md [--data ../shared/data] [--work FOLDER]
-        [--only REGEX] [--frames 60] [--choices 6]
+    python tools/experiment.py few_views [--only REGEX] [--frames 60] [--choices 6]
 
+By choices of two and three of a recording's cameras: mean and least MODA / IDF1, percent; the share of points that are
+wrong, percent; and the share that the run states itself, by the log-odds of each point. Everybody counts, also people
+that the chosen cameras cannot see: in `wildtrack` most.
 WORK holds uu4.toml, cmc2.csv, cmc2.toml, cmc2_fairmot.toml, wildtrack.csv and wildtrack.toml, as tools/results.py
 leaves them. Of a rig with many cameras some choices are tried, evenly among all.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
-from workbench import ROOT, commit
+from workbench import command_line, write_table
 
 from experiments.target_trials import CMC_AREA, Recorded, delivered, filmed
 from experiments.targets import tracked
@@ -30,14 +31,6 @@ from stseg.simulation import NAMED
 _VIEWS = (2, 3)
 _GATE = 0.5
 """Distance within which a point is right, metres."""
-_PAGE = """# Two and three views of everything
-
-Of the default tracker on the first {frames} frames, by choices of two and three of a recording's cameras: mean and
-least MODA / IDF1, percent; the share of its points that are wrong, percent; and the share that it states itself, by the
-log-odds of each point. Everybody counts, also whom the chosen cameras cannot see: in `wildtrack` most people. Made by
-`tools/experiment.py few_views` at commit {commit}.
-
-"""
 
 
 @dataclass(frozen=True)
@@ -99,32 +92,24 @@ def measured(made: Recorded, chosen: tuple[int, ...]) -> Row:
     return Row(named, scores.moda or 0.0, scores.idf1, 100 * wrong, 100 * stated)
 
 
-def line(name: str, number: int, rows: list[Row]) -> str:
-    """One line of the table."""
+def line(name: str, number: int, rows: list[Row]) -> list[object]:
+    """One row of the table."""
     values = np.array([(row.moda, row.idf1, row.wrong, row.stated) for row in rows])
     (moda, idf1, wrong, stated), least = values.mean(0), values.min(0)
     worst = min(rows, key=lambda row: row.moda).chosen
-    return (
-        f"| {name} | {number} | {len(rows)} | {moda:.1f} / {idf1:.1f} | {least[0]:.1f} / {least[1]:.1f} | {worst} "
-        f"| {wrong:.1f} | {stated:.1f} |"
-    )
+    scores = f"{moda:.1f} / {idf1:.1f}", f"{least[0]:.1f} / {least[1]:.1f}"
+    return [name, number, len(rows), *scores, worst, f"{wrong:.1f}", f"{stated:.1f}"]
 
 
 def main() -> None:
     """Write the table, after each line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
-    parser.add_argument("--work", type=Path, default=ROOT / "build/results")
+    parser = command_line(__doc__)
     parser.add_argument("--only", default=".", help="of the recordings' names")
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--choices", type=int, default=6)
     asked = parser.parse_args()
-    head = _PAGE.format(frames=asked.frames, commit=commit())
-    lines = [
-        "| recording | views | choices | mean | least | least by cameras | wrong points | stated |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
+    head = ["recording", "views", "choices", "mean", "least", "least by cameras", "wrong points", "stated"]
+    lines: list[list[object]] = [[*head]]
     for name, make in recordings(asked.data, asked.work).items():
         if re.search(asked.only, name):
             made = make(asked.frames)
@@ -134,4 +119,4 @@ def main() -> None:
                     rows.append(measured(made, chosen))
                     print(f"{name}, {rows[-1]}", flush=True)
                 lines.append(line(name, number, rows))
-                asked.output.write_text(head + "\n".join(lines) + "\n", "utf-8")
+                write_table(asked.output / "few_views.csv", lines)

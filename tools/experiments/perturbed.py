@@ -1,28 +1,23 @@
 """Mean and spread of the scores of perturbed runs: area, grid, cameras and boxes perturbed (tools/measure.py).
 
     python tools/experiment.py perturbed --sets laboratory,cmc2 [--runs 8] [--jobs 2] [--set stage.key=value]...
-        [--record]
 
-Crowds are chaotic: one run says little. `--record` writes the rows to docs/results/perturbed.csv.
+Crowds are chaotic: one run says little.
 """
 
 from __future__ import annotations
 
-import argparse
-import csv
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 from measure import prepare, scored_run
 from result_sets import SETS
-from workbench import ROOT, Bench, commit
+from workbench import Bench, command_line, commit, write_table
 
 from stseg.io.config_file import read_config
 
-TABLE = ROOT / "docs" / "results" / "perturbed.csv"
 SCORES = ("moda", "idf1", "mota", "switches")
 
 
@@ -34,14 +29,11 @@ def run(name: str, bench: Bench, settings: Sequence[str], seed: int) -> list[flo
 
 def main() -> None:
     """Measure, a line for each set."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--sets", default="laboratory,cmc1,cmc2,cmc2_fairmot_features,wildtrack,uu4,easy,dense4")
     parser.add_argument("--runs", type=int, default=8)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="stage.key=value")
-    parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
-    parser.add_argument("--work", type=Path, default=ROOT / "build/results")
-    parser.add_argument("--record", action="store_true", help=f"write {TABLE.relative_to(ROOT)}")
     asked = parser.parse_args()
     bench = Bench(asked.data.resolve(), asked.work.resolve())
     rows = []
@@ -53,6 +45,4 @@ def main() -> None:
         mean, spread = found.mean(0), found.std(0, ddof=1) if asked.runs > 1 else np.zeros(len(SCORES))
         rows.append([name, asked.runs, *(f"{m:.1f} ± {s:.1f}" for m, s in zip(mean, spread, strict=True)), commit()])
         print(", ".join(map(str, rows[-1])), flush=True)
-    if asked.record:
-        with TABLE.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows([["set", "runs", *SCORES, "commit"], *rows])
+        write_table(asked.output / "perturbed.csv", [["set", "runs", *SCORES, "commit"], *rows])

@@ -11,7 +11,6 @@ differs.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 import os
@@ -25,7 +24,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from result_sets import SETS
-from workbench import ROOT, Bench
+from workbench import ROOT, Bench, command_line
 
 _UNCOMPARED = ("timings", "provenance")
 """Parts of a run file in which equal runs differ."""
@@ -147,10 +146,8 @@ def differences(before: dict[str, str], now: dict[str, str]) -> list[str]:
 
 def main() -> None:
     """Compare, a line for each recording."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("base", help="the commit to compare with")
-    parser.add_argument("--work", type=Path, required=True, help="folder for inputs, run files and digests")
-    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--sets", default="", help="names, by comma; all if not given")
     parser.add_argument("--quick", action="store_true", help="the first frames of each recording, without the demo")
     parser.add_argument("--jobs", type=int, default=2, help="runs at the same time")

@@ -1,28 +1,26 @@
 """How the time of a frame grows with the ground, the views, the people and the pixels: measured, with exponents.
 
-    python tools/experiment.py scaling -o build/scaling.md [--axes area,views] [--kinds masks,boxes,video]
-        [--sides 5,10,20,40,80]
+    python tools/experiment.py scaling [--axes area,views] [--kinds masks,boxes,video] [--sides 5,10,20,40,80]
 
 One of the four is changed at a time; the others stay at 10 m x 10 m, 8 views, 10 people, 320 x 240 pixels. The area is
 that of the grid alone: people and cameras stay where they are, so that the ground is all that grows. Costs are CPU
-milliseconds a frame in one thread, tables and backgrounds made before. Beside the page a picture of its name is drawn.
-A ground of 80 m x 80 m takes 12 GiB of memory and is measured when it is asked for.
+milliseconds a frame in one thread, tables and backgrounds made before, with the share of each stage. The exponent is
+the slope of a line through all logarithms, behind it that of the last step. A ground of 80 m x 80 m takes 12 GiB of
+memory and is measured when it is asked for.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
-from workbench import commit
+from workbench import command_line, write_table
 
 from stseg import Tracker
-from stseg.arrays import Bytes, Floats, Observation
+from stseg.arrays import Bytes, Observation
 from stseg.geometry import Rig
 from stseg.simulation import NAMED, SceneFilm
 from stseg.simulation.rendering.render import RenderedView
@@ -44,15 +42,6 @@ _READY, _MEASURED = 8, 16
 _EMPTY = 10
 """Images from which a background is learned."""
 _STAGES = ("foreground", "detection", "occupancy", "tracking")
-_PAGE = """# How the time of a frame grows
-
-CPU milliseconds a frame in one thread, and the share of each stage: foreground, detection (ghosts), occupancy, and the
-tracker with its cuts (track). One value is changed at a time, the others are 10 m x 10 m, 8 views, 10 people and images
-of 320 x 240; the area is that of the grid alone. The exponent is the slope of a line through all logarithms, behind it
-that of the last step. Made by `tools/experiment.py scaling` at commit {commit}.
-
-![Milliseconds a frame over area, views, people and pixels]({picture})
-"""
 
 
 @dataclass(frozen=True)
@@ -118,52 +107,23 @@ def exponent(values: Sequence[int], taken: Sequence[float]) -> str:
     return f"{np.polyfit(x, y, 1)[0]:.2f}, last {(y[-1] - y[-2]) / (x[-1] - x[-2]):.2f}"
 
 
-def draw(found: dict[str, dict[str, list[float]]], axes: Axes, path: Path) -> None:
-    """A panel for each axis, a line for each kind."""
-    import matplotlib.pyplot as plt
-
-    plt.rcParams.update({"svg.hashsalt": "scaling", "svg.fonttype": "none"})
-    figure, panels = plt.subplots(1, len(found), figsize=(3.2 * len(found), 3.0), squeeze=False, sharey=True)
-    for panel, (axis, by_kind) in zip(panels[0], found.items(), strict=True):
-        label, values = axes[axis]
-        for kind, taken in by_kind.items():
-            panel.loglog(values, taken, marker="o", markersize=3, label=kind)
-        panel.set_xticks(values, [str(value) for value in values])
-        panel.minorticks_off()
-        panel.set_xlabel(label)
-        panel.grid(alpha=0.3)
-    panels[0][0].set_ylabel("CPU ms a frame")
-    panels[0][0].legend()
-    figure.tight_layout()
-    figure.savefig(path, metadata={"Date": None})
-
-
 def main() -> None:
-    """Measure; write the page and the picture."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", "--output", type=Path, required=True)
+    """Measure; write a table for each axis."""
+    parser = command_line(__doc__)
     parser.add_argument("--axes", type=lambda text: text.split(","), default=list(AXES))
     parser.add_argument("--kinds", type=lambda text: text.split(","), default=list(KINDS))
     parser.add_argument("--sides", type=lambda text: [int(side) for side in text.split(",")], default=AXES["area"][1])
     asked = parser.parse_args()
     axes = AXES | {"area": (AXES["area"][0], tuple(asked.sides))}
-    picture: Path = asked.output.with_suffix(".svg")
-    lines, found = [_PAGE.format(commit=commit(), picture=picture.name)], dict[str, dict[str, list[float]]]()
     for axis in asked.axes:
         label, values = axes[axis]
-        lines += [
-            f"\n| {label} | {' | '.join(map(str, values))} | exponent |",
-            f"| --- |{' --: |' * len(values)} --- |",
-        ]
-        found[axis] = {}
+        rows: list[list[object]] = [[label, *values, "exponent"]]
         for kind in asked.kinds:
             measured = [cost(shown(axis, value), kind) for value in values]
-            taken = found[axis][kind] = [one for one, _ in measured]
-            print(axis, kind, [round(one, 1) for one in taken], flush=True)
-            lines.append(f"| {kind} | {' | '.join(f'{one:.1f}' for one in taken)} | {exponent(values, taken)} |")
-            shares: Floats = np.array([share for _, share in measured])
-            for stage, own in zip(_STAGES, shares.T, strict=True):
-                lines.append(f"| &nbsp; {stage} | {' | '.join(f'{100 * one:.0f} %' for one in own)} | |")
+            taken = [one for one, _ in measured]
+            rows.append([kind, *(f"{one:.1f}" for one in taken), exponent(values, taken)])
+            print(*rows[-1], flush=True)
+            for stage, own in zip(_STAGES, np.transpose([share for _, share in measured]), strict=True):
+                rows.append([stage, *(f"{100 * one:.0f} %" for one in own), ""])
+        write_table(asked.output / f"scaling_{axis}.csv", rows)
         crowd.cache_clear()
-    asked.output.write_text("\n".join(lines) + "\n", "utf-8")
-    draw(found, axes, picture)

@@ -1,7 +1,7 @@
 """How much spoiled masks and boxes cost: kinds of errors, three strengths each, few and many views, crowds; and uu4.
 
-    python tools/experiment.py spoil -o build/spoiled.md [--kinds holes,jitter] [--strengths middle]
-        [--views 2,4] [--crowds 3,8] [--seconds 4] [--uu4 RIG.toml --uu4-truth TRACKS.csv] [--uu4-frames 0:60]
+    python tools/experiment.py spoil [--kinds holes,jitter] [--strengths middle] [--views 2,4] [--crowds 3,8]
+        [--seconds 4] [--uu4 RIG.toml --uu4-truth TRACKS.csv] [--uu4-frames 0:60]
 
 Each cell of the table is MODA / IDF1, percent, of the default tracker on a simulated crowd of `easy`'s area (images of
 320 x 240, 10 frames per second), by masks or, for errors of boxes, by boxes. Views of 2 and 4 are some of those of 8.
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from workbench import commit
+from workbench import command_line, write_table
 
 from stseg import Tracker
 from stseg.arrays import Observation, Rows
@@ -32,14 +32,6 @@ from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 from stseg.simulation.spoiling.spoil import STRENGTHS, body_width, spoiled_boxes, spoiled_mask
 
 NAMES = ("weak", "middle", "strong")
-_PAGE = """# What spoiled masks and boxes cost
-
-MODA / IDF1, percent, of the default tracker. Simulated crowds on 6 m x 6 m, {seconds:g} s at 10 frames per second,
-images of 320 x 240. Kinds and strengths of errors are those of `stseg simulate --spoil`. Rows of errors of boxes are
-run from boxes, all others from masks. In short films, one of three people found a second late costs ten points. Made
-by `tools/experiment.py spoil` at commit {commit}.
-
-"""
 EXACT = "none"
 """Kind of the rows without an error."""
 
@@ -63,12 +55,11 @@ class Shown:
         widths = [body_width(camera, centre) for camera in self.rig.cameras]
         for frame, views in enumerate(self.frames):
             moments = [Moment(1, k, frame, self.rig.frame_rate, width) for k, width in enumerate(widths)]
-            pairs = list(zip(views, moments, strict=True))
             yield tuple(
                 spoiled_boxes(view.boxes, spoils, moment)
                 if by_boxes
                 else spoiled_mask(view.mask, view.instances, spoils, moment)
-                for view, moment in pairs
+                for view, moment in zip(views, moments, strict=True)
             )
 
 
@@ -128,8 +119,7 @@ def columns(asked: argparse.Namespace) -> dict[str, Shown]:
 
 def main() -> None:
     """Write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser = command_line(__doc__)
     parser.add_argument("--kinds", default=",".join((EXACT, *MASK_KINDS, *BOX_KINDS)))
     parser.add_argument("--strengths", default=",".join(NAMES))
     parser.add_argument("--views", default="2,3,4,8")
@@ -139,14 +129,14 @@ def main() -> None:
     parser.add_argument("--uu4-truth", type=Path)
     parser.add_argument("--uu4-frames", default="0:60")
     asked = parser.parse_args()
-    shown, head = columns(asked), _PAGE.format(seconds=asked.seconds, commit=commit())
-    lines = [f"| error | strength | {' | '.join(shown)} |", f"| --- | --- |{' --- |' * len(shown)}"]
+    shown = columns(asked)
+    lines = [["error", "strength", *shown]]
     for kind in asked.kinds.split(","):
         for name in (EXACT,) if kind == EXACT else asked.strengths.split(","):
             strength = 0.0 if kind == EXACT else STRENGTHS[kind][NAMES.index(name)]
             cells = [
                 "-" if one == "uu4" and kind in BOX_KINDS else scores(own, kind, strength) for one, own in shown.items()
             ]
-            lines.append(f"| {kind} | {name} {strength:g} | {' | '.join(cells)} |")
-            print(lines[-1], flush=True)
-            asked.output.write_text(head + "\n".join(lines) + "\n", "utf-8")
+            lines.append([kind, f"{name} {strength:g}", *cells])
+            print(*lines[-1], flush=True)
+            write_table(asked.output / "spoil.csv", lines)

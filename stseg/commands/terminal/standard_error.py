@@ -6,33 +6,30 @@ import faulthandler
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from io import TextIOWrapper
+from threading import Event, Thread
+
+_PATIENCE = 3.0
+"""Seconds after which a command without a bar says that it is at work."""
+_shown = Event()
 
 
 @contextmanager
-def frame_bar(work: str, total: int | None, done: int = 0) -> Iterator[Callable[[int], None]]:
-    """A bar on standard error; yields a function to call with the number of frames just done.
+def patience() -> Iterator[None]:
+    """A line on a terminal if a command has shown no bar and not ended after some seconds."""
 
-    Parameters
-    ----------
-    work
-        Name of the work, one word.
-    total, done
-        Frames in all, None if unknown, and those done before.
-    """
-    if not sys.stderr.isatty():
-        yield lambda more: None  # noqa: ARG005
-        return
-    from rich.console import Console  # imported where there is a bar
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-    from rich.progress import TimeElapsedColumn as Elapsed
-    from rich.progress import TimeRemainingColumn as Remaining
+    def note() -> None:
+        if not _shown.wait(_PATIENCE):
+            print("stseg: at work; Ctrl-C ends it", file=sys.stderr, flush=True)
 
-    columns = TextColumn(work), BarColumn(), TaskProgressColumn(), Elapsed(), Remaining()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(work, total=total, completed=done)
-        yield lambda more: bar.advance(task, more)
+    _shown.clear()
+    if sys.stderr.isatty():
+        Thread(target=note, daemon=True).start()
+    try:
+        yield
+    finally:
+        _shown.set()
 
 
 def warn(warnings: Iterable[str]) -> None:
@@ -50,12 +47,25 @@ class TerminalReporter:
     def __init__(self, warnings: Sequence[str] = ()) -> None:
         self._warnings = list(warnings)
 
-    def progress(self, work: str, total: int | None, done: int = 0) -> AbstractContextManager[Callable[[int], None]]:
-        """A bar, see `frame_bar`."""
+    @contextmanager
+    def progress(self, work: str, total: int | None, done: int = 0) -> Iterator[Callable[[int], None]]:
+        """A bar on a terminal; yields a function to call with the number of frames just done."""
         if total is not None:
             warn(self._warnings)
             self._warnings.clear()
-        return frame_bar(work, total, done)
+        if not sys.stderr.isatty():
+            yield lambda more: None  # noqa: ARG005
+            return
+        from rich.console import Console  # imported where there is a bar
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+        from rich.progress import TimeElapsedColumn as Elapsed
+        from rich.progress import TimeRemainingColumn as Remaining
+
+        _shown.set()
+        columns = TextColumn(work), BarColumn(), TaskProgressColumn(), Elapsed(), Remaining()
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(work, total=total, completed=done)
+            yield lambda more: bar.advance(task, more)
 
     @staticmethod
     def note(line: str) -> None:

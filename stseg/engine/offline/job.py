@@ -52,9 +52,9 @@ class Job:
         return reduced if wanted else reduced.without_images()
 
     def gaps(self) -> list[tuple[int, int]]:
-        """Half-open ranges of frames that no camera shows, longer than any track is continued unseen."""
+        """Half-open ranges of frames in which no camera shows anything, longer than any track is continued unseen."""
         longest = longest_absence(self.config.tracking) * self.recording.rig.frame_rate
-        return find_gaps(self.streams.visible_ranges(self.recording), self.first, self.stop, longest)
+        return find_gaps(self.streams.filled_ranges(self.recording), self.first, self.stop, longest)
 
     def segments(self) -> list[Segment]:
         """The segments of the run, in the order of time."""

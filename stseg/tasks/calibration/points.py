@@ -12,7 +12,7 @@ import numpy as np
 from stseg.arrays import Ints
 from stseg.calibration.points.point_fit import PointFit, Points, fit_points
 from stseg.engine.recordings import AnySource, camera_source
-from stseg.errors import ConfigError
+from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Grid, Rig
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.calibrations.world_frame import UNITS, World, require_unit
@@ -101,8 +101,12 @@ def calibrate_points(
         require_output(output, overwrite, Inputs([lens_file]))
         known_lens = None if lens_file is None else read_opencv_lens(lens_file)
         metres = table.place * UNITS[unit]
-        fits.append(fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), known_lens))
-        require_unit(f"camera {table.camera}", "a camera", float(fits[-1].camera.centre[2]), World(unit))
+        try:
+            fits.append(fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), known_lens))
+            require_unit(f"camera {table.camera}", "a camera", float(fits[-1].camera.centre[2]), World(unit))
+        except CalibrationError as error:
+            key = f"{error.place}, lines {table.line[0]} to {table.line[-1]}, {error.key}"
+            raise CalibrationError(points, key, error.found, error.expected) from None
     names = [table.camera for table in tables]
     rig = Rig(scene or output.stem, frame_rate, grid, tuple(fit.camera for fit in fits))
     recording = Recording(output, rig, tuple(map(camera_source, _sources(sources, names))))
