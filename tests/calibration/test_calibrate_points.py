@@ -201,7 +201,7 @@ class TestCommand:
 
     def test_millimetres_are_named_and_taken(self) -> None:
         table(Path("p.csv"), lambda _, row: [*row[:2], *(1000 * cell for cell in row[2:])])
-        refused(CalibrationError, r"p.csv: camera a, lines 2 to 11, --unit m: found a camera 2600 m .*\(--unit mm\)", run, "p.csv")
+        refused(CalibrationError, r"a, lines 2 to 11, --unit m: found a camera 2600 m .*\(--unit mm\)", run, "p.csv")
         run("p.csv", "--unit=mm")
         assert off(read_recording("room.toml").rig.cameras[0], camera(0.7)) < 0.05
 
