@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stseg.arrays import Floats
+from stseg.arrays import Bytes, Flags, Floats
 from stseg.errors import CalibrationError
 from stseg.geometry.camera import Camera
 from stseg.geometry.fits import homogeneous
@@ -116,6 +117,15 @@ class Rig:
         ground, vertical = matrix[:, :, [0, 1, 3]], matrix[:, :, 2]
         return cls.from_homographies(ground, vertical, sizes, grid, frame_rate, names=names, name=name)
 
+    @cached_property
+    def most_views(self) -> Bytes:
+        """Number of views that see the cell above each ground cell that most of them see, uint8 (y, x)."""
+        views = [
+            np.sum([_sees(camera, self.grid.ground, height) for camera in self.cameras], 0)
+            for height in self.grid.heights
+        ]
+        return np.asarray(np.max(views, 0) * self.grid.inside(), np.uint8)
+
     def reduced(self, factors: Sequence[int]) -> Rig:
         """The rig with each camera's images reduced by a whole factor."""
         cameras = tuple(camera.reduced(factor) for camera, factor in zip(self.cameras, factors, strict=True))
@@ -135,7 +145,7 @@ class Rig:
                 raise CalibrationError(f"camera {camera.name}", "ground", found, expected)
 
 
-def _sees(camera: Camera, ground: Floats, height: float) -> Floats:
+def _sees(camera: Camera, ground: Floats, height: float) -> Flags:
     pixel, ahead = camera.project(ground, height)
     return np.asarray(ahead & camera.inside(pixel))
 

@@ -36,8 +36,8 @@ class PixelAssignment(NamedTuple):
         Image pixels to a raster pixel.
     row : int64 (image v,), column : int64 (image u,)
         Raster row and column of each row and column of the image.
-    distance : float64 (person,)
-        From the camera along the ground, metres.
+    distance : float64 (1 + person,)
+        From the camera along the ground, metres; the first is that of no person, infinite.
     separate : bool (person,)
         Whether a box of this view is assigned to the person: the cells near such a person count as unoccluded.
     """
@@ -78,7 +78,7 @@ def _hidden_pixels(
     for j in range(assigned.row[top], assigned.row[top + height - 1] + 1):
         for i in range(assigned.column[left], assigned.column[left + width - 1] + 1):
             other = assigned.raster[j, i]
-            if other >= 0 and other != person and assigned.distance[other] < distance - SHOULDER:
+            if other >= 0 and other != person and assigned.distance[other + 1] < distance - SHOULDER:
                 hidden += _overlap(top, height, assigned.step, j) * _overlap(left, width, assigned.step, i)
     return hidden
 
@@ -107,7 +107,7 @@ def _others_inside(
             other = assigned.raster[j, i]
             if other >= 0 and other != person:
                 u, until = max(left, i * assigned.step), min(left + width, (i + 1) * assigned.step)
-                if assigned.distance[np.uint64(other)] < distance - SHOULDER:
+                if assigned.distance[np.uint64(other + 1)] < distance - SHOULDER:
                     hidden += (end - v) * (until - u)
                 total += int(sum_of(table.sums, u - table.left, v - table.top, until - table.left, end - table.top))
     return hidden, total
@@ -161,7 +161,6 @@ def fill_share(
 def fill_map(
     cells: ShownCells,
     marked: Flags,
-    people: Flags,
     footprint: Footprints,
     table: SumTable,
     assigned: PixelAssignment,
@@ -172,41 +171,45 @@ def fill_map(
     """Fill levels and share (n,) of the cells of marked blocks by a view with a map; UNSEEN where it does not see them.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background. Blocks
-    marked bool (block,) are those at which the view shows something, people bool (block,) those of them at which it
-    shows a person.
+    marked bool (block,) are those at which the view shows something.
     """
     for b in range(len(cells.start) - 1):
-        block = np.uint64(cells.block[b])
-        if marked[block]:
+        if marked[np.uint64(cells.block[b])]:
             for k in range(cells.start[b], cells.start[b + 1]):
-                levels[k], share[k] = _level_and_share(cells, k, people[block], footprint, table, assigned, distance)
+                left, top, width, height = footprint[np.uint64(cells.cell[k])]
+                nearest, far = cells.near_person[k], distance[cells.place[k]]
+                if width == 1 and height == 1:
+                    levels[k], share[k] = _of_one_pixel(left, top, nearest, far, table, assigned)
+                else:
+                    levels[k], share[k] = _of_pixels(left, top, width, height, nearest, far, table, assigned)
 
 
 @part
-def _level_and_share(
-    cells: ShownCells,
-    k: int,
-    shows_people: bool,
-    footprint: Footprints,
-    table: SumTable,
-    assigned: PixelAssignment,
-    distance: Singles,
+def _of_one_pixel(
+    left: int, top: int, nearest: int, far: float, table: SumTable, assigned: PixelAssignment
 ) -> tuple[int, np.float32]:
-    """Level and share of cell k; see `fill_map`."""
-    left, top, width, height = footprint[np.uint64(cells.cell[k])]
+    """Level and share of a cell with a footprint of one pixel, as most have: few branches, which are not foreseen."""
+    u, v = left - table.left, top - table.top
+    level = int(sum_of(table.sums, u, v, u + 1, v + 1))
+    other = assigned.raster[assigned.row[np.uint64(top)], assigned.column[np.uint64(left)]]
+    is_other = (other >= 0) & (other != nearest)
+    if nearest >= 0:
+        is_other = is_other & (not assigned.separate[nearest])
+    is_hidden = is_other & (assigned.distance[np.uint64(other + 1)] < far - SHOULDER)
+    return 0 if is_other & (not is_hidden) else level, np.float32(0 if is_hidden else 1)
+
+
+@part
+def _of_pixels(
+    left: int, top: int, width: int, height: int, nearest: int, far: float, table: SumTable, assigned: PixelAssignment
+) -> tuple[int, np.float32]:
+    """Level and share of a cell with any footprint; see `fill_map`."""
     if width == 0:
         return UNSEEN, np.float32(1)
     u, v = left - table.left, top - table.top
     total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
-    nearest, visible = cells.near_person[k], np.float32(1)
-    is_open = shows_people and not (nearest >= 0 and assigned.separate[nearest])
-    if is_open and pixels == 1:
-        other = assigned.raster[assigned.row[np.uint64(top)], assigned.column[np.uint64(left)]]
-        if other >= 0 and other != nearest:
-            is_hidden = assigned.distance[np.uint64(other)] < distance[cells.place[k]] - SHOULDER
-            visible, total = np.float32(0 if is_hidden else 1), total if is_hidden else 0
-    elif is_open and _shows_a_person(assigned, left, top, width, height):
-        far = distance[cells.place[k]]
+    visible, is_open = np.float32(1), not (nearest >= 0 and assigned.separate[nearest])
+    if is_open and _shows_a_person(assigned, left, top, width, height):
         hidden, others = _others_inside(assigned, table, left, top, width, height, nearest, far)
         visible -= np.float32(hidden) / np.float32(pixels)
         if visible > 0:

@@ -171,10 +171,11 @@ class Occupancy:
         weights: Singles,
     ) -> FrameTerms:
         """Terms of the views at the cells that are fused one by one, and at the representatives of the others."""
-        levels, share = np.full_like(cells.unseen, UNSEEN), np.ones(cells.unseen.shape, np.float32)
+        levels, share = np.empty_like(cells.unseen), np.ones(cells.unseen.shape, np.float32)
         confidence = np.ones((len(views), len(explanation.people)), np.float32)
         for i, view in enumerate(views):
             if view is None:
+                levels[i] = UNSEEN
                 continue
             if view.table is not None:
                 empty = view.table.lowest
@@ -200,8 +201,7 @@ class Occupancy:
         """Fill levels and share (n + k,), the empty level and 1 before, of a view at the cells fused one by one."""
         footprint, distance = self.sampling.footprint[i].reshape(-1, 4), self.sampling.distance[i].reshape(-1)
         if view.table is not None:
-            people = view.people.reshape(-1)
-            fill_map(cells, marked, people, footprint, view.table, view.assignment, distance, levels, share)
+            fill_map(cells, marked, footprint, view.table, view.assignment, distance, levels, share)
         elif view.fit is not None:
             share[:] = 1.0
             fill_share(cells, marked, footprint, view.assignment, distance, share)
@@ -240,7 +240,7 @@ class Occupancy:
         separate[assigned[assigned >= 0]] = True
         camera, step, raster = self.rig.cameras[i], explanation.raster_step[i], explanation.pixel_assignment[i]
         width, height = camera.size
-        distance = np.hypot(*(people.ground - camera.centre[:2]).T)
+        distance = np.append(np.inf, np.hypot(*(people.ground - camera.centre[:2]).T))
         occupied = np.zeros((raster.shape[0] + 1, raster.shape[1] + 1), np.int32)
         np.cumsum((raster >= 0).cumsum(0, dtype=np.int32), 1, out=occupied[1:, 1:])
         return PixelAssignment(

@@ -13,7 +13,6 @@ import numpy as np
 from stseg.arrays import Flags, Ints, Labels, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.geometry.sampling import Sampling
 from stseg.graphcut.cut import greatest_empty_set
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.solvers import SOLVERS, find_solver
@@ -43,7 +42,6 @@ class CutTracker:
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
-        self.views = Sampling.of(rig, "point").views()
         self.filter = TrackFilter(rig.frame_rate, config)
         self.association = TrackAssociation(rig.frame_rate, config.tracking)
         spread, unassigned = config.body.height_spread, config.occupancy.occupied_share
@@ -196,9 +194,8 @@ class CutTracker:
             tall, wide = people.sizes.measured(self.config.body)
             height[detected], score[detected] = tall[detections], people.evidence[detections]
             width[detected] = wide[detections]
-        views = views_at(self.views, ground, self.rig.grid)
         tracks = TrackPlaces(identity[named], ground, covariance, height, width, score)
-        return trajectory_rows(fused.frame, tracks, blobs.extent[named], views)
+        return trajectory_rows(fused.frame, tracks, blobs.extent[named], views_at(self.rig, ground))
 
 
 def _ranges(window: Window) -> tuple[int, int, int, int, int]:

@@ -10,7 +10,6 @@ from stseg.arrays import Floats, Ints, Labels
 from stseg.config import Config
 from stseg.geometry import Grid, Rig
 from stseg.geometry.nearest_person import nearest_person
-from stseg.geometry.sampling import Sampling
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.tables import WINDOW
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
@@ -23,7 +22,6 @@ class FramewiseTracker:
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config, self.frame = rig, config, first
-        self.cell_views = Sampling.of(rig, "point").views()
 
     def finish(self) -> list[Commit]:
         """No frame is open."""
@@ -33,8 +31,7 @@ class FramewiseTracker:
         """Commit a frame with its tracks and events."""
         grid, reach = self.rig.grid, self.config.occupancy.person_radius
         label, extent = _reached_cells(fused, tracks.ground, tracks.ids, grid, reach)
-        views = views_at(self.cell_views, tracks.ground, grid)
-        rows = trajectory_rows(fused.frame, tracks, extent, views)
+        rows = trajectory_rows(fused.frame, tracks, extent, views_at(self.rig, tracks.ground))
         return Commit([fused], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
 
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Bytes, Floats, Ints, Rows
-from stseg.geometry import Grid
+from stseg.arrays import Floats, Ints, Rows
+from stseg.geometry import Rig
 from stseg.records.tables import EVENT, TRAJECTORY
 
 Event = tuple[int, str, int, int, str]
@@ -48,10 +48,9 @@ def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats, views: Ints
     return rows[np.argsort(ids, kind="stable")]
 
 
-def views_at(views: Bytes, ground: Floats, grid: Grid) -> Ints:
-    """Number of views that see some plane above each place (n, 2), from the grid's views (plane, y, x); int64 (n,)."""
-    cell = np.rint(grid.cell_of(ground)).astype(int)
-    most = views.max(0)
+def views_at(rig: Rig, ground: Floats) -> Ints:
+    """Number of views that see some plane above each place (n, 2), int64 (n,)."""
+    cell, most = np.rint(rig.grid.cell_of(ground)).astype(int), rig.most_views
     column, row = cell[:, 0].clip(0, most.shape[1] - 1), cell[:, 1].clip(0, most.shape[0] - 1)
     return np.asarray(most[row, column], np.int64)
 

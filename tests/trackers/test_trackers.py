@@ -10,6 +10,7 @@ from scenes import CONFIG, FRAME_RATE, found, people
 from stseg.arrays import Floats
 from stseg.errors import ConfigError
 from stseg.geometry.nearest_person import nearest_person
+from stseg.geometry.sampling import Sampling
 from stseg.graphcut.grid_energy import QUANTUM
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import WINDOW
@@ -210,10 +211,9 @@ def test_rows_are_sorted_by_id() -> None:
 
 
 def test_views_at_places() -> None:
-    views = np.zeros((2, 16, 16), np.uint8)
-    views[1, 3, 5], views[0, 3, 5] = 4, 2
-    place = RIG.grid.ground[3, 5]
-    assert views_at(views, np.array([place, place + 1.0, [50.0, -50.0]]), RIG.grid).tolist() == [4, 0, 0]
+    rig = replace(RIG, cameras=(replace(RIG.cameras[0], size=(60, 45)), *RIG.cameras[1:]))
+    seen = Sampling.of(rig, "point").views().max(0).reshape(-1).tolist()
+    assert views_at(rig, rig.grid.ground.reshape(-1, 2)).tolist() == seen and set(seen) == {3, 4}
 
 
 def test_events_in_rows() -> None:
