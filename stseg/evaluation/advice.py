@@ -15,6 +15,8 @@ from stseg.evaluation.alignment import best_motion, ground_of, moved_rows, numbe
 
 _MATCHING, _GAIN = 0.5, 0.3
 """Least share of the truth's rows that meet tracks under a reading that is named, and least gain over the given one."""
+_ALIEN_SHARE = 0.05
+"""Share of the truth's rows that meet tracks below which it may be of another recording."""
 _UNITS = {"": 1.0, "in millimetres": 1e-3, "in centimetres": 1e-2, "in kilometres": 1e3, "in feet": 0.3048}
 _AXES = {"": (1, 1), "with x negated": (-1, 1), "with y negated": (1, -1), "with x and y exchanged": (1, 1)}
 _PAIRED_ROWS = 500, 20_000
@@ -24,7 +26,7 @@ _LEAST_EXTENT = 1.0
 
 
 def reading_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
-    """One sentence that names the reading of a truth that tracks would match; None where the given one does, or none.
+    """One sentence that names the reading of a truth that tracks would match; None where the given one does.
 
     Parameters
     ----------
@@ -44,7 +46,8 @@ def reading_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
         if share > best + 1e-9:
             best, words = share, reading
     if best < max(_MATCHING, given + _GAIN):
-        return None
+        alien = "tracks meet hardly a row of the truth: is it of this recording, with its frames, and in metres?"
+        return alien if given < _ALIEN_SHARE else None
     return f"tracks meet {100 * given:.0f} % of the truth's rows, and {100 * best:.0f} % if the truth is {words}"
 
 

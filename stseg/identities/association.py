@@ -204,5 +204,6 @@ def _prevailing_track(rows: Rows, reach: float) -> Ints:
 def _link(before: np.void, after: np.void, identity: int, frame_rate: float) -> Link:
     seconds = (after["frame"] - before["frame"]) / frame_rate
     away = float(np.hypot(after["x"] - before["x"], after["y"] - before["y"]))
-    reason = f"{seconds:.1f} s on, {away:.2f} m away, {before['height']:.2f} and {after['height']:.2f} m tall"
-    return Link(int(after["frame"]), identity, int(after["id"]), reason)
+    heights = float(before["height"]), float(after["height"])
+    tall = ", {:.2f} and {:.2f} m tall".format(*heights) if np.isfinite(heights).all() else ""
+    return Link(int(after["frame"]), identity, int(after["id"]), f"{seconds:.1f} s on, {away:.2f} m away{tall}")

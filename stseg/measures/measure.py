@@ -22,7 +22,7 @@ LINE = np.dtype([("line", "O"), ("left", "<i8"), ("right", "<i8"), ("per_minute"
 """One row per line: crossings to each side, crossings a minute, metres a second."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Measures:
     """Tables of measures, see the records in `stseg.measures`."""
 
@@ -34,6 +34,9 @@ class Measures:
     tracks: Rows
     spacing: Rows
     field: Rows
+
+    def __repr__(self) -> str:
+        return f"Measures({', '.join(f'{name}: {len(rows)} rows' for name, rows in self.tables().items())})"
 
     def tables(self) -> dict[str, Rows]:
         """The tables by name."""

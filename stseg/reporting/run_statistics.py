@@ -12,7 +12,7 @@ from stseg.arrays import Bytes, Flags, Floats, Ints, Rows
 
 DOUBT_LIMIT = 0.9
 """Probability below which a point is doubtful."""
-BUSY_DURATION = 600.0
+LONG_RUN = 600.0
 """Length of a run from which its busiest minutes are shown separately, seconds."""
 _EXCHANGE_RATE, _RATE_NEAR_ENDS, _RATE_OF_ABSENCE = 0.058, 0.044, 0.15
 """Exchanges of a track, by each track that begins or ends near it, and by each second in which it has no row."""
@@ -50,7 +50,7 @@ def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
     return np.array([means.get(int(track), np.nan) for track in tracks["id"]])
 
 
-def exchange_chances(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> Floats:
+def exchanges(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> Floats:
     """Chance that each of `tracks` shows another person for a second or more, float64 (n,), 0..1.
 
     That is more likely where another track begins or ends near it, away from the border float64 (2, 2) (the lower and

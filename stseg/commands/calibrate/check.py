@@ -15,7 +15,7 @@ from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.source_files import recording_files
-from stseg.tasks.calibration.check import COLUMNS, RigCheck, check_rig
+from stseg.tasks.calibration.check import COLUMNS, READING, RigCheck, check_rig
 
 
 def check(
@@ -78,5 +78,6 @@ def _print(found: RigCheck) -> None:
     for row in found.rows():
         table.add_row(*row)
     console.print(table)
+    console.print(READING, style="dim", soft_wrap=True)
     for sentence in found.verdict:
         console.print(sentence, style=None if found.sound else "yellow", soft_wrap=True)

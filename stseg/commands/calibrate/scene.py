@@ -94,7 +94,8 @@ class StreamOptions:
         if self.sources is not None and self.source_pattern is None:
             return [Path(path) for path in words("--sources", self.sources, len(names))]
         if self.source_pattern is None or self.sources is not None:
-            raise ConfigError("--source-pattern, --sources", "", "both or neither", "one of them")
+            given = "neither" if self.sources is None else "both"
+            raise ConfigError("--source-pattern, --sources", "", given, "one of them")
         if len(names) > 1 and "{name}" not in self.source_pattern:
             raise ConfigError("--source-pattern", "", repr(self.source_pattern), "a path with {name} in it")
         return [_filled(self.source_pattern, name) for name in names]

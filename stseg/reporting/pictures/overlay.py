@@ -56,7 +56,9 @@ def overlay(
     view = OverlayView(camera, width)
     canvas = view.canvas(image)
     if image is None or image.ndim == 2:
-        _rule(canvas, view, grid)
+        (x0, x1), (y0, y1) = grid.x, grid.y
+        stops = [*np.arange(np.ceil(x0), x1), x0, x1], [*np.arange(np.ceil(y0), y1), y0, y1]
+        _ground_lines(canvas, view, grid, *stops, _RULE_STYLES)
     trajectory = with_heights(trajectory)
     present = trajectory[trajectory["frame"] == frame]
     recent = trajectory[(trajectory["frame"] <= frame) & (trajectory["frame"] >= frame - trail)]
@@ -155,19 +157,13 @@ def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
     chips(canvas, heads, [*map(str, ids)], map(track_colour, ids), 13, bounds)
 
 
-def _rule(canvas: Bytes, view: OverlayView, grid: Grid) -> None:
-    """The ground's metres, and its rectangle a little brighter."""
-    (x0, x1), (y0, y1) = grid.x, grid.y
-    _ground_lines(canvas, view, grid, [*np.arange(np.ceil(x0), x1), x0, x1], [*np.arange(np.ceil(y0), y1), y0, y1])
-
-
 def _ground_lines(
     canvas: Bytes,
     view: OverlayView,
     grid: Grid,
     x_stops: Sequence[float],
     y_stops: Sequence[float],
-    styles: tuple[tuple[Colour, int], ...] = _RULE_STYLES,
+    styles: tuple[tuple[Colour, int], ...],
 ) -> None:
     """Lines over the whole ground at x and at y, in the second style where they are its border."""
     along_x, along_y = np.linspace(*grid.x, 400), np.linspace(*grid.y, 400)

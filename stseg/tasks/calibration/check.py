@@ -32,6 +32,11 @@ DEFAULT_FRAMES = 300
 """Frames that are read by default."""
 COLUMNS = ("camera", "people", "shown %", "feet cm", "heads cm", "right cm", "down cm", "ground cm", "px")
 """Headings of `RigCheck.rows`."""
+READING = (
+    "feet, heads: off across the line of sight from where other views put them, root mean square; the larger decides, "
+    "less the others' error. right, down: mean at the feet. ground, px: feet on the ground and in the image."
+)
+"""Explanation of the columns."""
 _FIELDS = ("people", "confirmed", "feet", "heads", "right", "down", "ground", "pixels")
 
 
@@ -181,9 +186,7 @@ def _page(found: RigCheck) -> str:
     numbers = section(
         "Views",
         table(COLUMNS, rows, len(rows)),
-        note(
-            "Off by so much, across the line of sight, from where the other views put feet and heads; root mean square."
-        ),
+        note(READING),
     )
     views = section("Ground and poles", figures(grids, "pair"), note("These pictures hold frames of the cameras."))
     ground = section("Coverage", figures([seen_by], "pair"))
