@@ -120,10 +120,8 @@ class Rig:
     @cached_property
     def most_views(self) -> Bytes:
         """Number of views that see the cell above each ground cell that most of them see, uint8 (y, x)."""
-        views = [
-            np.sum([_sees(camera, self.grid.ground, height) for camera in self.cameras], 0)
-            for height in self.grid.heights
-        ]
+        ground, heights = self.grid.ground, self.grid.heights
+        views = [np.sum([_sees(camera, ground, height) for camera in self.cameras], 0) for height in heights]
         return np.asarray(np.max(views, 0) * self.grid.inside(), np.uint8)
 
     def reduced(self, factors: Sequence[int]) -> Rig:

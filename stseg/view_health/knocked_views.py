@@ -104,7 +104,7 @@ class KnockedViews:
         measured = (number > 0) & ~self.knocked & (self.usual.sums[:, 0] >= self._usual_frames)
         falls = measured & (self._fall(share) > 1)
         if falls.any() or self.knocked.any():
-            self._count_gains(number, np.array([people.gain() for people in expected]), measured, falls)
+            self._count_gains(number, expected, measured, falls)
         counted = ~self.knocked & (number > 0)
         self.usual.forget(counted)
         self.usual.add(np.column_stack([np.ones(len(views)), share, share**2])[counted], counted)
@@ -116,10 +116,13 @@ class KnockedViews:
         spread = np.sqrt(np.maximum(_mean(usual[:, ::2]) - mean**2, 0.0))
         return np.asarray((mean - share) / np.maximum(_FALL, _FALL_DEVIATIONS * spread))
 
-    def _count_gains(self, number: Ints, gains: Floats, measured: Flags, falls: Flags) -> None:
+    def _count_gains(self, number: Ints, people: Sequence[_ExpectedPeople], measured: Flags, falls: Flags) -> None:
         """Count the gain of the best shift by a number of people (view,), and decide which views are knocked."""
-        steady = measured & (gains < _STEADY_GAIN * number)
+        gains = np.array([one.gain() if due else 0.0 for one, due in zip(people, falls | self.knocked, strict=True)])
         shifted = falls & (gains >= np.maximum(_TOTAL_GAIN, _FALL * number))
+        if shifted.any():  # seldom: only then all others are asked, at 961 shifts each
+            gains = np.array([one.gain() for one in people])
+        steady = measured & (gains < _STEADY_GAIN * number)
         begins = shifted & (steady.sum() >= OTHER_VIEWS) & (shifted.sum() == 1)
         self.recent.forget()
         self.recent.sums[begins] = 0.0
