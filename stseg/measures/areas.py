@@ -167,7 +167,11 @@ def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float)
         ground = np.stack([stay["x"], stay["y"]], -1)
         kept: list[tuple[int, float, int]] = []
         for row, share, side in _intersections(line, ground):
-            if kept and kept[-1][2] != side and not _far(line, ground[kept[-1][0] + 1 : row + 1], band):
+            if (
+                kept
+                and kept[-1][2] != side
+                and line.distance(ground[kept[-1][0] + 1 : row + 1]).max(initial=0.0) <= band
+            ):
                 kept.pop()
             else:
                 kept.append((row, share, side))
@@ -180,10 +184,6 @@ def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float)
             place = (round(float(x), 4), round(float(y), 4), round(speed, 4))
             found.append((line.name, int(np.ceil(frame)), frame / frame_rate, int(stay["id"][0]), reached, *place))
     return np.sort(np.array(found, CROSSING), order=["time", "id"])
-
-
-def _far(line: Line, ground: Floats, band: float) -> bool:
-    return bool(len(ground) and line.distance(ground).max() > band)
 
 
 def _intersections(line: Line, ground: Floats) -> list[tuple[int, float, int]]:

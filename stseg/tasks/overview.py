@@ -62,6 +62,7 @@ def summarise_run(run: Run) -> Overview:
     ghosts, reasons = run.ghosts["status"] == 0, ghost_reasons(run.ghosts)
     solved = run.windows["solve_stop"] - run.windows["solve_first"]
     kinds, counts = np.unique(run.events["kind"], return_counts=True)
+    last_rates = run.rates[run.rates["frame"] == run.rates["frame"].max(initial=-1)]
     return Overview(
         file=str(run.path),
         scene=run.scene,
@@ -90,7 +91,7 @@ def summarise_run(run: Run) -> Overview:
         ghosts_denied_by=dict(zip(run.cameras, reasons.denies.sum(axis=0).tolist(), strict=True)),
         windows=len(solved),
         frames_per_window=per(solved.sum(), len(solved)),
-        rates=_rates(run),
+        rates={run.cameras[row["view"]]: {name: float(row[name]) for name in ERROR_RATES} for row in last_rates},
         seconds_by_stage=seconds_by_stage(run),
         bytes_per_frame=per(size, count),
         bytes=size,
@@ -108,11 +109,6 @@ def seconds_by_stage(run: Run) -> dict[str, float]:
     names, stage = np.unique(run.timings["stage"], return_inverse=True)
     seconds = np.bincount(stage, run.timings["seconds"], len(names))
     return {names[index].decode(): float(seconds[index]) for index in np.argsort(-seconds, kind="stable")}
-
-
-def _rates(run: Run) -> dict[str, dict[str, float]]:
-    last = run.rates[run.rates["frame"] == run.rates["frame"].max(initial=-1)]
-    return {run.cameras[row["view"]]: {name: float(row[name]) for name in ERROR_RATES} for row in last}
 
 
 def _tracks(run: Run) -> list[dict[str, float]]:

@@ -49,6 +49,8 @@ def page_contents(
     places, shares = dwell_places(trajectory, bins), ground_by_views(run.views, rig.grid.inside(), len(run.cameras))
     frames_shown = np.array([instant.frame for instant in instants], np.int64)
     sheets = thin_sheets(run.frames, rig.grid, run.read_frame, _SHEETS, frames_shown)
+    removed = density(bins, ghosts.ghosts, len(run.frames))
+    ghost_map = heat_map(rig, bins, removed, "Where ghosts were removed", "ghosts a frame and square metre")
     plan, thread = ground_figures(rig, run.views, trajectory, truth, run.names)
     counts = (len(run.frames), trajectory, run.tracks, run.events, len(run.ghosts))
     return Contents(
@@ -69,7 +71,7 @@ def page_contents(
         plan=plan,
         thread=thread,
         dwell_places=_haunt_figures(run, bins, places),
-        ghost_map=_ghost_figure(run, bins, ghosts),
+        ghost_map=Figure("ghosts", ghost_map, f"Ghosts removed, {bins.side:g} m squares."),
         blind_map=Figure("blind", blind_map(rig, run.views), "Red is seen by no view, orange by one alone."),
         view_summaries=_view_summaries(run, ghosts),
         stages=list(seconds_by_stage(run).items()),
@@ -157,12 +159,6 @@ def _busy_figures(run: Run, span: Span) -> list[Figure]:
         words = f"The minute from {since}: {minute.mean:.1f} people at a time, at most {minute.most}."
         figures.append(Figure(f"busy{number}", picture, words))
     return figures
-
-
-def _ghost_figure(run: Run, bins: Bins, ghosts: GhostReasons) -> Figure:
-    values = density(bins, ghosts.ghosts, len(run.frames))
-    picture = heat_map(run.recording.rig, bins, values, "Where ghosts were removed", "ghosts a frame and square metre")
-    return Figure("ghosts", picture, f"Ghosts removed, {bins.side:g} m squares.")
 
 
 def _view_summaries(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:

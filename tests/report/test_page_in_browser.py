@@ -104,6 +104,15 @@ def test_play_goes_on_to_the_end_and_stops(page: Page) -> None:
     page.wait_for("play.textContent === 'Play'")
 
 
+def test_the_path_of_one_track_is_shown(page: Page) -> None:
+    slide(page, 0)
+    before = pictures(page)
+    page.ask("whose.value = '1'; whose.onchange(); 0")
+    assert pictures(page)[2] != before[2], "the other is paler in space and time"
+    page.ask("whose.value = '-1'; whose.onchange(); 0")
+    assert pictures(page) == before and page.complaints == []
+
+
 def test_a_run_without_frames_has_a_page_that_does_not_complain(tmp_path: Path) -> None:
     report(run_files.write_empty_run(tmp_path / "empty.h5"), output=tmp_path / "empty.html")
     with chromium(tmp_path / "profile") as browser:

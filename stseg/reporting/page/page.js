@@ -8,7 +8,7 @@
   const [x0, x1] = data.x, [y0, y1] = data.y;
   const INK = "#2a2e34", QUIET = "#7c828a", RULE = "#d5d9de", GHOST = "#8a6d3b";
   const TRAIL = 5; // seconds
-  let moment = 0, picked = -1;
+  let moment = 0, picked = -1, chosen = null; // the track whose whole path is shown
 
   // ---- data ----
 
@@ -166,7 +166,8 @@
     });
     const back = now() - TRAIL * data.frameRate;
     tracks.forEach((track) => {
-      const first = rowAt(track, back), last = rowAt(track, now() + 1);
+      const [first, last] = track === chosen ? [0, track.frame.length] : [rowAt(track, back), rowAt(track, now() + 1)];
+      if (chosen && track !== chosen) return;
       pen.strokeStyle = track.colour;
       pen.lineWidth = 2.5;
       if (last - first > 1) line(pen, Array.from({ length: last - first }, (_, k) => [u(track.x[first + k]), v(track.y[first + k])]));
@@ -290,6 +291,7 @@
     const every = Math.max(1, Math.ceil(near.reduce((sum, part) => sum + part.last - part.first, 0) / MOST_POINTS));
     near.forEach(({ track, first, last }) => {
       const middle = Math.min(last, Math.max(first, rowAt(track, now() + 1)));
+      if (chosen && track !== chosen) return thread(pen, place, track, first, last, every, 0.06);
       thread(pen, place, track, first, middle, every, 1);
       thread(pen, place, track, Math.max(first, middle - 1), last, every, 0.28);
     });
@@ -381,6 +383,8 @@
   element("play").onclick = play;
   element("plane").onchange = drawSlice;
   element("span").onchange = drawThread;
+  tracks.forEach((track, k) => element("whose").add(new Option(`of track ${track.name}`, String(k))));
+  element("whose").onchange = () => { chosen = tracks[element("whose").value] || null; drawPlan(); drawThread(); };
   window.onresize = () => show(moment);
   window.onhashchange = () => show(fromAddress());
   const canvas = element("thread");

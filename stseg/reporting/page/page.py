@@ -202,7 +202,8 @@ def _thread(fallback: Figure) -> str:
     return (
         '<div><figure class="live"><canvas id="thread"></canvas><figcaption>The ground below, time upwards; pale is '
         'still to come. Drag to turn. Shown: <select id="span" aria-label="span of time"><option value="0">the whole '
-        f"run</option></select></figcaption></figure><noscript>{figure(fallback)}</noscript></div>"
+        'run</option></select> <select id="whose" aria-label="track"><option value="-1">of all tracks</option></select>'
+        f"</figcaption></figure><noscript>{figure(fallback)}</noscript></div>"
     )
 
 

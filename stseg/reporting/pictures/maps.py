@@ -146,7 +146,8 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     canvas = sheet(plan, "Views that see the ground")
     view_count = views.max(axis=0)
     most = max(len(rig.cameras), int(view_count.max()))
-    tones = [_blind_tone(count, most) for count in range(most + 1)]
+    tones = [(60, 60, 190), (120, 190, 250)]  # seen by none, by one; the more the lighter
+    tones += [mixed((206, 199, 195), (252, 251, 250), (count - 1) / (most - 1)) for count in range(2, most + 1)]
     paint_bins(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[view_count])
     draw_ground(canvas, plan, rig)
     v = plan.size[1] - 38.0
@@ -175,12 +176,6 @@ def warm_colours(values: AnyArray, limit: float) -> Bytes:
     share = np.clip(np.asarray(values, float) / limit, 0, 1)
     stops = np.linspace(0, 1, len(_WARM_TONES))
     return np.asarray(np.rint(np.stack([np.interp(share, stops, tone) for tone in _WARM_TONES.T], -1)), np.uint8)
-
-
-def _blind_tone(count: int, most: int) -> Colour:
-    if count < 2:
-        return ((60, 60, 190), (120, 190, 250))[count]
-    return mixed((206, 199, 195), (252, 251, 250), (count - 1) / max(most - 1, 1))
 
 
 def _ramp(canvas: Bytes, plan: PlanMap, limit: float, units: str) -> None:
