@@ -68,17 +68,17 @@ def filmed_rig() -> Rig:
     return rig_of([looking(name, place) for name, place in PLACES.items()])
 
 
-def write_recording(folder: Path, frames: int = FRAMES) -> Path:
+def write_recording(folder: Path, frames: int = FRAMES, rig: Rig | None = None) -> Path:
     """The recording, in a folder that exists; its rig file."""
-    rig = filmed_rig()
-    lines = {name: ["frame,left,top,width,height"] for name in PLACES}
+    rig = filmed_rig() if rig is None else rig
+    lines = {camera.name: ["frame,left,top,width,height"] for camera in rig.cameras}
     for frame_set in box_frame_sets(rig, walkers(frames), 0, frames):
-        for name, view in zip(PLACES, frame_set.views, strict=True):
+        for name, view in zip(lines, frame_set.views, strict=True):
             assert isinstance(view, Boxes)
             lines[name] += [f"{frame_set.frame},{','.join(map(repr, row))}" for row in view.pixel.tolist()]
     for name, text in lines.items():
         (folder / f"{name}.csv").write_text("\n".join(text) + "\n")
-    streams = tuple(CameraSource(Source("boxes", folder / f"{name}.csv", 0, frames)) for name in PLACES)
+    streams = tuple(CameraSource(Source("boxes", folder / f"{name}.csv", 0, frames)) for name in lines)
     path = folder / "rig.toml"
     path.write_text(format_rig(Recording(path, rig, streams), path))
     return path

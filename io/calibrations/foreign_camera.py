@@ -10,7 +10,6 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError, InputError
 from stseg.geometry import Lens
-from stseg.geometry.lens import LensModel
 from stseg.io.lenses import checked_lens
 from stseg.io.toml import Table
 
@@ -62,7 +61,7 @@ def camera_from_pose(
     rotation: Floats,
     translation: Floats,
     distortion: Floats,
-    model: LensModel = "pinhole",
+    fisheye: bool = False,
 ) -> ForeignCamera:
     """A camera P = K [R | t], with its lens unless that is none; file, name and size as in `ForeignCamera`.
 
@@ -71,15 +70,14 @@ def camera_from_pose(
     matrix, no rotation, or too many coefficients; CalibrationError where R is a mirror.
     """
     key = f"camera {name}" if name else "camera"
-    lens = checked_lens(
-        matrix,
-        distortion,
-        model,
-        lambda name, *found: FormatError(file, f"{key}, {_KEYS[name]}", *found),
-    )
+
+    def error(name: str, found: object, expected: str) -> FormatError:
+        return FormatError(file, f"{key}, {_KEYS[name]}", found, expected)
+
+    lens = checked_lens(matrix, distortion, "fisheye" if fisheye else "pinhole", error)
     if not np.abs(rotation @ rotation.T - np.eye(3)).max() <= _ORTHONORMAL:
         raise FormatError(file, f"{key}, rotation", np.round(rotation, 3).tolist(), "a rotation")
     if np.linalg.det(rotation) < 0:
         raise CalibrationError(file, f"{key}, rotation", "a mirror", "a rotation, which keeps left and right")
     projection = matrix @ np.column_stack([rotation, translation])
-    return ForeignCamera(file, name, size, projection, lens if distortion.any() or model == "fisheye" else None)
+    return ForeignCamera(file, name, size, projection, lens if distortion.any() or fisheye else None)

@@ -110,7 +110,9 @@ def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[
     # The lower edge of an image shows the ground, if anything does.
     foot = homogeneous(np.array([(size[0] - 1) / 2, size[1] - 1.0])) @ ground.T
     homography = homography * np.sign(float(homography[2] @ (foot / foot[2])))
-    place, visible = _seen(homography, homogeneous(pixel) @ ground.T)
+    image = homogeneous(pixel) @ ground.T
+    place = image[:, :2] / image[:, 2:]
+    visible = homogeneous(place) @ homography[2] > 0
     image = homogeneous(place[visible]) @ to_head.T
     if visible.sum() < _SAMPLES:
         raise CalibrationError(names, "homography", "a ground plane that the image hardly shows", "one that it does")
@@ -120,12 +122,6 @@ def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[
     return [ForeignCamera(files[0], "", size, projection)]
 
 
-def _seen(homography: Floats, ground: Floats) -> tuple[Floats, Floats]:
-    """Ground points of homogeneous ones, and which of them lie in front of the camera."""
-    place = ground[:, :2] / ground[:, 2:]
-    return place, homogeneous(place) @ homography[2] > 0
-
-
 def _rows(file: Path) -> list[list[float]]:
     try:
         text = read_text(file)
@@ -133,10 +129,5 @@ def _rows(file: Path) -> list[list[float]]:
         raise FormatError(file, "", error.strerror or error, _PLANES) from error
     except ValueError as error:
         raise FormatError(file, "", "what is no text", _PLANES) from error
-    found = (_three(line) for line in text.translate(str.maketrans("[](){},;", " " * 8)).splitlines())
-    return [row for row in found if row is not None]
-
-
-def _three(line: str) -> list[float] | None:
-    words = line.split()
-    return parse_numbers(words) if len(words) == 3 else None
+    lines = map(str.split, text.translate(str.maketrans("[](){},;", " " * 8)).splitlines())
+    return [row for words in lines if len(words) == 3 and (row := parse_numbers(words)) is not None]

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
-from stseg.geometry.lens import LensModel
 from stseg.io.calibrations.foreign_camera import ForeignCamera, ForeignTable, camera_from_pose
 from stseg.io.extras import load_extra
 from stseg.io.toml import ANY, parse_toml
@@ -55,13 +54,13 @@ def _poses(top: ForeignTable) -> Iterator[ForeignCamera]:
     if not tables:
         raise top.error("", "no camera", "tables with matrix, rotation and translation")
     for table in tables:
-        model: LensModel = "fisheye" if table.values.get("fisheye") else "pinhole"
+        fisheye = bool(table.values.get("fisheye"))
         name = str(table.values.get("name", table.values.get("cam_id", table.place.rpartition(".")[2])))
         size = table.image_size("size") if "size" in table else None
         rotation = np.asarray(Rotation.from_rotvec(table.vector("rotation", 3)).as_matrix())
         distortion = table.numbers("distortions", ANY) if "distortions" in table else np.zeros(5)
         translation, matrix = table.vector("translation", 3), table.matrix("matrix", 3, 3)
-        yield camera_from_pose(top.file, name, size, matrix, rotation, translation, distortion, model)
+        yield camera_from_pose(top.file, name, size, matrix, rotation, translation, distortion, fisheye)
 
 
 def _is_camera(value: object) -> bool:
@@ -97,15 +96,9 @@ def _frame_size(sensor: ForeignTable) -> tuple[int, int] | None:
     listed = sensor.values.get("attributes")
     rows = [row for row in listed if isinstance(row, dict)] if isinstance(listed, list) else []
     given = {name: row.get("value") for row in rows if isinstance(name := row.get("name"), str)}
-    sides = [_side(given.get(key)) for key in ("frameWidth", "frameHeight")]
+    # Some files write numbers as text.
+    sides = [parse_whole(str(given.get(key)), 1, limits.SIDE) for key in ("frameWidth", "frameHeight")]
     return (sides[0], sides[1]) if sides[0] is not None and sides[1] is not None else None
-
-
-def _side(value: object) -> int | None:
-    """A side of an image, pixels, which some files write as text."""
-    if isinstance(value, str):
-        return parse_whole(value, 1, limits.SIDE)
-    return value if type(value) is int and 1 <= value <= limits.SIDE else None
 
 
 def read_kalibr_yaml(files: Sequence[Path]) -> list[ForeignCamera]:
@@ -144,8 +137,8 @@ def _chain(top: ForeignTable) -> Iterator[ForeignCamera]:
         matrix = np.array([[fu, 0, pu], [0, fv, pv], [0, 0, 1]])
         distortion: Floats = np.zeros(4) if lens == "none" else table.numbers("distortion_coeffs", 4)
         size = table.image_size("resolution")
-        model: LensModel = "fisheye" if lens == "equidistant" else "pinhole"
-        yield camera_from_pose(top.file, name, size, matrix, pose[:3, :3], pose[:3, 3], distortion, model)
+        fisheye = lens == "equidistant"
+        yield camera_from_pose(top.file, name, size, matrix, pose[:3, :3], pose[:3, 3], distortion, fisheye)
 
 
 def _number(name: str) -> tuple[int, str]:

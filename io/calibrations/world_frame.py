@@ -121,18 +121,7 @@ def _likeliest_unit(height: float) -> str:
 
 def median_height(cameras: Sequence[ForeignCamera], world: World) -> float:
     """Median height of the cameras in that world, metres; negative below the ground."""
-    to_metres = np.linalg.inv(world.from_metres)
-    heights = [float((to_metres @ _centre(camera))[2]) for camera in cameras]
-    return float(np.median(heights))
-
-
-def _centre(camera: ForeignCamera) -> Floats:
-    """Homogeneous, in the foreign world, float64 (4,)."""
-    projection = camera.projection
-    try:
-        return np.append(-np.linalg.solve(projection[:, :3], projection[:, 3]), 1.0)
-    except np.linalg.LinAlgError as error:
-        raise CalibrationError(camera.file, "projection matrix", "a singular one", "a camera's") from error
+    return float(np.median([world.camera(camera, "camera", (1, 1)).centre[2] for camera in cameras]))
 
 
 def _rotation(camera: ForeignCamera) -> Floats:

@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.geometry import Lens
-from stseg.geometry.lens import LensModel
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.outputs.whole_files import MARK, write_file
 from stseg.io.untrusted import limits
@@ -65,16 +64,15 @@ def _camera(roots: Sequence[tuple[Path, ElementTree.Element]], rotation: Floats,
     _, distortion = _numbers(roots, _DISTORTION, (4, 5, 8, 12, 14))
     fisheye = any((root.findtext("fisheye_model") or "0").strip() != "0" for _, root in roots)
     turned = np.asarray(Rotation.from_rotvec(rotation).as_matrix())
-    model: LensModel = "fisheye" if fisheye else "pinhole"
-    return camera_from_pose(file, "", None, matrix.reshape(3, 3), turned, translation, distortion, model)
+    return camera_from_pose(file, "", None, matrix.reshape(3, 3), turned, translation, distortion, fisheye)
 
 
-def write_opencv_lens(path: Path, matrix: Floats, distortion: Floats, overwrite: bool) -> None:
+def write_opencv_lens(path: Path, lens: Lens, overwrite: bool) -> None:
     """Write `camera_matrix` and `distortion_coefficients` as OpenCV's FileStorage does; `read_opencv_lens` reads it."""
     nodes = "\n".join(
         f'<{name} type_id="opencv-matrix">\n  <rows>{rows.shape[0]}</rows>\n  <cols>{rows.shape[1]}</cols>\n'
         f"  <dt>d</dt>\n  <data>{' '.join(map(repr, rows.ravel().tolist()))}</data>\n</{name}>"
-        for name, rows in ((_MATRIX[0], matrix), (_DISTORTION[0], distortion.reshape(-1, 1)))
+        for name, rows in ((_MATRIX[0], lens.matrix), (_DISTORTION[0], lens.distortion.reshape(-1, 1)))
     )
     write_file(path, f"{_HEAD}<opencv_storage>\n{nodes}\n</opencv_storage>\n".encode(), overwrite)
 

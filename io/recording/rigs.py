@@ -16,7 +16,7 @@ import numpy as np
 
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.geometry.lens import LENS_MODELS
+from stseg.geometry.lens import COEFFICIENTS
 from stseg.io.detections.tables import COLUMNS
 from stseg.io.lenses import checked_lens
 from stseg.io.outputs.whole_files import MARK, Inputs, require_output, write_file
@@ -215,7 +215,7 @@ def _placed(table: Table, by_projection: bool) -> Iterator[None]:
 
 def _lens(table: Table) -> Lens:
     table.allow("model", "matrix", "distortion")
-    model = table.choice("model", LENS_MODELS) if "model" in table else "pinhole"
+    model = table.choice("model", COEFFICIENTS) if "model" in table else "pinhole"
     return checked_lens(table.numbers("matrix", 3, 3), table.numbers("distortion", ANY), model, table.error)
 
 

@@ -75,7 +75,7 @@ def _moved(solution: SolvedViews, turn: float, middle: Floats, scale: float) -> 
 def cameras_of(solution: SolvedViews, names: Sequence[str]) -> tuple[Camera, ...]:
     """The adjusted cameras as `Camera` objects."""
     return tuple(
-        as_camera(view, name, _size(solution, k))
+        as_camera(view, name, solution.problem.size_of(k))
         for k, (name, view) in enumerate(zip(names, solution.adjustment.parameters.views, strict=True))
     )
 
@@ -101,7 +101,7 @@ def reports_of(solution: SolvedViews, scale_spread: float) -> list[ViewReport]:
 
 def _report(solution: SolvedViews, view: int, scale_spread: float) -> ViewReport:
     adjustment, correspondences = solution.adjustment, solution.problem.correspondences
-    parameters, size = adjustment.parameters, _size(solution, view)
+    parameters, size = adjustment.parameters, solution.problem.size_of(view)
     rows = np.flatnonzero(correspondences.view == view)
     length = np.hypot(*(correspondences.foot[rows] - correspondences.head[rows]).T)
     residual_pixels = np.linalg.norm(adjustment.residual[rows], axis=2) * length[:, None]
@@ -125,8 +125,3 @@ def _report(solution: SolvedViews, view: int, scale_spread: float) -> ViewReport
         clock=float(camera[CLOCK]),
         clock_spread=float(spread[CLOCK]),
     )
-
-
-def _size(solution: SolvedViews, view: int) -> tuple[int, int]:
-    width, height = solution.problem.size[view].tolist()
-    return width, height

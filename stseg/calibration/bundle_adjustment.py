@@ -70,6 +70,11 @@ class BundleProblem:
     """float64 (m,): 1 for an observation of a person, 0 for one of a floor feature: that has no toe offset, and a head
     of infinite spread."""
 
+    def size_of(self, view: int) -> tuple[int, int]:
+        """Width and height of a view's images, pixels."""
+        width, height = self.size[view].tolist()
+        return width, height
+
 
 @dataclass(frozen=True)
 class Adjustment:

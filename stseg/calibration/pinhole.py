@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Lens
+from stseg.geometry.fits import middle_matrix
 
 FOCAL, MIDDLE, RADIAL, TURN, CENTRE, CLOCK = 0, slice(1, 3), slice(3, 5), slice(5, 8), slice(8, 11), 11
 """Slices of the vector: log of focal length over image width; principal point from the image's middle, in widths;
@@ -57,7 +58,7 @@ def _fold_squared(radial: Floats) -> Floats:
 
 def rays(view: Floats, size: tuple[int, int], pixel: Floats) -> Floats:
     """Viewing rays of pixels of one view, world directions, float64 (n, 3); nan beyond the lens's fold."""
-    lens = _lens(view, size)
+    lens = lens_of(view, size)
     ideal = lens.undistort(pixel)
     ray = (ideal - lens.matrix[:2, 2]) / lens.matrix[0, 0]
     return np.asarray(Rotation.from_rotvec(view[TURN]).inv().apply(np.column_stack([ray, np.ones(len(ray))])))
@@ -82,10 +83,14 @@ def height_of_head(view: Floats, size: tuple[int, int], pixel: Floats, ground: F
 
 def as_camera(view: Floats, name: str, size: tuple[int, int]) -> Camera:
     """Convert to a ground homography, a vertical and a lens."""
-    lens = _lens(view, size)
+    lens = lens_of(view, size)
+    return Camera.from_projection(name, size, projection_of(view, lens.matrix), lens)
+
+
+def projection_of(view: Floats, matrix: Floats) -> Floats:
+    """K [R | -R c] of a camera matrix and a view's pose, float64 (3, 4)."""
     turn = Rotation.from_rotvec(view[TURN]).as_matrix()
-    projection = lens.matrix @ np.column_stack([turn, -turn @ view[CENTRE]])
-    return Camera.from_projection(name, size, projection, lens)
+    return np.asarray(matrix @ np.column_stack([turn, -turn @ view[CENTRE]]))
 
 
 def moved(view: Floats, turn: float, shift: Floats, scale: float) -> Floats:
@@ -103,18 +108,17 @@ def looking(pitch: float, roll: float) -> Floats:
     return np.asarray((Rotation.from_euler("z", roll) * Rotation.from_euler("x", pitch) * level).as_rotvec())
 
 
-def ground_jacobian(camera: Camera, ground: Floats, step: float) -> Floats:
-    """Jacobian of pixels in the ground point by differences of `step` metres, pixels a metre, float64 (n, 2, 2)."""
+def ground_jacobian(camera: Camera, ground: Floats, step: float, height: float = 0.0) -> Floats:
+    """Jacobian of pixels in a horizontal place by differences of `step` metres, pixels a metre, float64 (n, 2, 2)."""
     columns = [
-        (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
+        (camera.project(ground + move, height)[0] - camera.project(ground - move, height)[0]) / (2 * step)
         for move in step * np.eye(2)
     ]
     return np.stack(columns, -1)
 
 
-def _lens(view: Floats, size: tuple[int, int]) -> Lens:
-    width, height = size
-    focal = width * float(np.exp(view[FOCAL]))
-    u, v = np.array([(width - 1) / 2, (height - 1) / 2]) + view[MIDDLE] * width
-    matrix = np.array([[focal, 0, u], [0, focal, v], [0, 0, 1.0]])
-    return Lens(matrix, np.array([view[3], view[4], 0.0, 0.0, 0.0]))
+def lens_of(view: Floats, size: tuple[int, int]) -> Lens:
+    """Camera matrix and radial distortion of a view."""
+    matrix = middle_matrix(size[0] * float(np.exp(view[FOCAL])), size)
+    matrix[:2, 2] += view[MIDDLE] * size[0]
+    return Lens(matrix, view[RADIAL])

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from stseg.arrays import Ints, Rows
+from stseg.commands.calibrate.scene import area_of
 from stseg.commands.terminal.standard_error import warn
 from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
@@ -18,10 +19,9 @@ from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
 from stseg.evaluation.advice import reading_advice
 from stseg.evaluation.alignment import Alignment
-from stseg.evaluation.sequence import Area
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import abbreviated, parse_numbers, parse_whole
+from stseg.io.untrusted.values import abbreviated, parse_whole
 
 
 def evaluate(
@@ -66,7 +66,7 @@ def evaluate(
         Print one JSON object.
     """
     asked_frames = None if frames is None else _frames(frames)
-    asked_area = None if area is None else _area(area)
+    asked_area = None if area is None else area_of(area)
     rows, trajectory = read_tracks_csv(truth), _read(tracks)
     scores = score(rows, trajectory, gate, asked_area, asked_frames, ignore_flagged, align)
     if 2 * scores.hits < scores.truths and (advice := reading_advice(rows, trajectory, gate)):
@@ -97,17 +97,6 @@ def _frames(text: str) -> Ints | range:
         expected = f"A:B with B above A, or a list A,B,C; numbers up to {limits.FRAMES}"
         raise ConfigError("command line", "--frames", abbreviated(text), expected)
     return frames
-
-
-def _area(text: str) -> Area:
-    expected = "x0,y0,x1,y1 in metres with x0 below x1 and y0 below y1"
-    found = parse_numbers(text.split(","), limits.METRES)
-    if found is None or len(found) != 4:
-        raise ConfigError("command line", "--area", abbreviated(text), expected)
-    x0, y0, x1, y1 = found
-    if not (x0 < x1 and y0 < y1):
-        raise ConfigError("command line", "--area", repr(text), expected)
-    return x0, y0, x1, y1
 
 
 def _table(scores: Scores) -> Table:

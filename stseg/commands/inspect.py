@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.commands.terminal.standard_output import output_console
+from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
@@ -82,12 +82,7 @@ def _inspect_rig(path: Path, pictures: Path | None, overwrite: bool) -> None:
     recording = read_recording(path)
     summaries = summarise_sources(recording)
     console = output_console()
-    table = Table(box=None, padding=(0, 2, 0, 0), title=str(path), title_justify="left")
-    for name in COLUMNS:
-        table.add_column(name, justify="left" if name in ("camera", "recognised", "classes") else "right")
-    for summary in summaries:
-        table.add_row(*summary.row())
-    console.print(table)
+    console.print(table_of(COLUMNS, (summary.row() for summary in summaries), str(path)))
     for words in recording_warnings(recording, summaries):
         console.print(f"warning: {words}", style="yellow", soft_wrap=True)
     if pictures is not None:
@@ -154,24 +149,19 @@ def event_counts_text(counts: dict[str, int]) -> str:
 
 def _views(overview: Overview) -> Table:
     """Error rates of each view at the end of the run, and the ghosts that it denies."""
-    table = Table(title="views", title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for heading in ("view", "misses %", "clutter %", "beside people %", "denies ghosts"):
-        table.add_column(heading, justify="left" if heading == "view" else "right")
+    rows = []
     for name in overview.cameras:
         rates = overview.rates.get(name)
         errors = ("", "", "") if rates is None else tuple(f"{100 * rates[k]:.1f}" for k in ERROR_RATES)
-        table.add_row(name, *errors, str(overview.ghosts_denied_by[name]))
-    return table
+        rows.append((name, *errors, str(overview.ghosts_denied_by[name])))
+    return table_of(("view", "misses %", "clutter %", "beside people %", "denies ghosts"), rows, "views")
 
 
 def _longest(overview: Overview) -> Table:
-    longest = overview.tracks[:_LONGEST]
-    title = f"the {len(longest)} longest of {len(overview.tracks)} tracks"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for heading in ("id", "frames", "first", "last", "seconds", "height m", "score"):
-        table.add_column(heading, justify="right")
+    longest, rows = overview.tracks[:_LONGEST], []
     for track in longest:
         seconds = f"{track['frames'] / overview.frame_rate:.1f}"
         numbers = (f"{track[name]:.0f}" for name in ("id", "frames", "first", "last"))
-        table.add_row(*numbers, seconds, f"{track['height']:.2f}", f"{track['score']:.1f}")
-    return table
+        rows.append((*numbers, seconds, f"{track['height']:.2f}", f"{track['score']:.1f}"))
+    title = f"the {len(longest)} longest of {len(overview.tracks)} tracks"
+    return table_of(("id", "frames", "first", "last", "seconds", "height m", "score"), rows, title)

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
-from rich.table import Table
 
-from stseg.commands.terminal.standard_output import output_console
+from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.measures.measure import Measures
 from stseg.tasks import measures
 
@@ -56,18 +55,14 @@ def measure(
 
 def _print(found: Measures) -> None:
     console = output_console()
-    zones = Table(box=None, padding=(0, 2, 0, 0))
-    for name in ("zone", "people", "most", "entries", "exits", "dwell s", "per m2"):
-        zones.add_column(name, justify="left" if name == "zone" else "right")
+    rows = []
     for row in found.zones:
         people = f"{row['mean_people']:.2f} ± {row['deviation']:.2f}"
         numbers = (f"{row['median_dwell']:.1f}", f"{row['mean_density']:.3f}")
-        zones.add_row(row["zone"], people, str(row["most_people"]), str(row["entries"]), str(row["exits"]), *numbers)
-    console.print(zones)
+        rows.append((row["zone"], people, str(row["most_people"]), str(row["entries"]), str(row["exits"]), *numbers))
+    console.print(table_of(("zone", "people", "most", "entries", "exits", "dwell s", "per m2"), rows))
     if len(found.lines):
-        lines = Table(box=None, padding=(0, 2, 0, 0))
-        for name in ("line", "to left", "to right", "a minute"):
-            lines.add_column(name, justify="left" if name == "line" else "right")
-        for row in found.lines:
-            lines.add_row(row["line"], str(row["left"]), str(row["right"]), f"{row['per_minute']:.1f}")
-        console.print(lines)
+        crossings = [
+            (row["line"], str(row["left"]), str(row["right"]), f"{row['per_minute']:.1f}") for row in found.lines
+        ]
+        console.print(table_of(("line", "to left", "to right", "a minute"), crossings))

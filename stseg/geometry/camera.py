@@ -14,6 +14,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats
 from stseg.errors import CalibrationError
+from stseg.geometry.fits import homogeneous
 from stseg.geometry.lens import Lens, reduction
 
 _SINGULAR = 1e12
@@ -128,11 +129,22 @@ class Camera:
 
     def back_project(self, pixel: Floats, height: float = 0.0) -> Floats:
         """Ground metres of the points at `height` that the pixels show, float64 (..., 2); nan above the horizon."""
-        ideal = np.asarray(pixel, float) if self.lens is None else self.lens.undistort(pixel)
-        inverse = np.linalg.inv(self.plane(height))
-        ground = np.concatenate([ideal, np.ones_like(ideal[..., :1])], -1) @ inverse.T
+        ground = homogeneous(self.ideal(pixel)) @ np.linalg.inv(self.plane(height)).T
         ahead = ground[..., 2] > 0
         return np.asarray(ground[..., :2] / np.where(ahead, ground[..., 2], np.nan)[..., None])
+
+    def ideal(self, pixel: Floats) -> Floats:
+        """Pixels without the lens's distortion, float64 (..., 2); nan where no ray comes to them."""
+        return np.asarray(pixel, float) if self.lens is None else self.lens.undistort(pixel)
+
+    def rays(self, pixel: Floats) -> Floats:
+        """Directions in the world of what pixels show, float64 (..., 3); P takes them to (u, v, 1)."""
+        return np.asarray(homogeneous(self.ideal(pixel)) @ np.linalg.inv(self.projection[:, :3]).T)
+
+    def sees(self, ground: Floats, height: Floats | float) -> Flags:
+        """Whether points lie in front of the camera, before the lens's fold and on the image; as `project`."""
+        pixel, ahead = self.project(ground, height)
+        return np.asarray(ahead & self.inside(pixel))
 
     def inside(self, pixel: Floats) -> Flags:
         """Whether pixels lie on the image; pixel centres are integers, so it spans -0.5 .. size - 0.5."""

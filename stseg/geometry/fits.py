@@ -27,14 +27,14 @@ def fit_homography(ground: Floats, pixel: Floats) -> Floats:
     float64 (3, 3)
         Signed so that the points are in front of the camera.
     """
-    to_unit, from_unit = _unit(ground), np.linalg.inv(_unit(pixel))
-    x, y, one = to_unit @ homogeneous(ground).T
-    u, v, _ = _unit(pixel) @ homogeneous(pixel).T
+    unit_ground, unit_pixel = _unit(ground), _unit(pixel)
+    x, y, one = unit_ground @ homogeneous(ground).T
+    u, v, _ = unit_pixel @ homogeneous(pixel).T
     zero = np.zeros_like(x)
     along_u = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y, -u], -1)
     along_v = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y, -v], -1)
     unit = np.linalg.svd(np.concatenate([along_u, along_v]))[2][-1].reshape(3, 3)
-    homography = from_unit @ unit @ to_unit
+    homography = np.linalg.inv(unit_pixel) @ unit @ unit_ground
     sign = 1.0 if np.median(homogeneous(ground) @ homography[2]) > 0 else -1.0
     return np.asarray(homography * sign / np.linalg.norm(homography[2]))
 
@@ -86,9 +86,11 @@ def focal_of_square_pixels(homography: Floats, size: tuple[int, int]) -> float |
     flat = np.array([first[:2] @ second[:2], first[:2] @ first[:2] - second[:2] @ second[:2]])
     deep = np.array([first[2] * second[2], first[2] ** 2 - second[2] ** 2])
     inverse = -float(flat @ deep) / max(float(flat @ flat), 1e-300)
-    if inverse <= 0:
-        return None
-    focal = float(1 / np.sqrt(inverse))
+    return plausible_focal(float(1 / np.sqrt(inverse)), size) if inverse > 0 else None
+
+
+def plausible_focal(focal: float, size: tuple[int, int]) -> float | None:
+    """A focal length, or None where no lens has it."""
     return focal if _SHORTEST * size[0] < focal < _LONGEST * size[0] else None
 
 
@@ -122,6 +124,6 @@ def homogeneous(point: Floats) -> Floats:
 
 
 def _unit(point: Floats) -> Floats:
-    """The similarity that brings points to mean 0 and unit size."""
+    """The similarity that brings points (n, 2) to mean 0 and unit size, float64 (3, 3)."""
     middle, size = point.mean(axis=0), max(float(point.std()), 1e-300)
     return np.array([[1 / size, 0, -middle[0] / size], [0, 1 / size, -middle[1] / size], [0, 0, 1]])

@@ -8,8 +8,9 @@ S. Brandt, A generic camera model and calibration method, TPAMI 28(8), 2006.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -17,8 +18,10 @@ from numpy.polynomial import Polynomial
 from stseg.arrays import Complexes, Flags, Floats
 
 LensModel = Literal["pinhole", "fisheye"]
-LENS_MODELS: tuple[LensModel, ...] = get_args(LensModel)
-COEFFICIENTS = {"pinhole": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), "fisheye": ("k1", "k2", "k3", "k4")}
+COEFFICIENTS: Mapping[LensModel, tuple[str, ...]] = {
+    "pinhole": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+    "fisheye": ("k1", "k2", "k3", "k4"),
+}
 """Names of the numbers of `Lens.distortion`, by model."""
 _UNDISTORT_ROUNDS = 50
 

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stseg.arrays import Bytes, Flags, Floats
+from stseg.arrays import Bytes
 from stseg.errors import CalibrationError
 from stseg.geometry.camera import Camera
 from stseg.geometry.fits import homogeneous
@@ -121,7 +121,7 @@ class Rig:
     def most_views(self) -> Bytes:
         """Number of views that see the cell above each ground cell that most of them see, uint8 (y, x)."""
         ground, heights = self.grid.ground, self.grid.heights
-        views = [np.sum([_sees(camera, ground, height) for camera in self.cameras], 0) for height in heights]
+        views = [np.sum([camera.sees(ground, height) for camera in self.cameras], 0) for height in heights]
         return np.asarray(np.max(views, 0) * self.grid.inside(), np.uint8)
 
     def reduced(self, factors: Sequence[int]) -> Rig:
@@ -133,7 +133,7 @@ class Rig:
         """Raise CalibrationError for a camera that sees no cell of the area on any plane."""
         ground = self.grid.ground[self.grid.inside()]
         for camera in self.cameras:
-            if not any(np.any(_sees(camera, ground, height)) for height in self.grid.heights):
+            if not any(camera.sees(ground, height).any() for height in self.grid.heights):
                 found, expected = "a view that sees nothing of the area", "some cell in its image"
                 if is_mirrored(camera, self.grid):
                     found = "a mirrored ground (y counted downwards, as in a picture?)"
@@ -141,11 +141,6 @@ class Rig:
                         "y counted upwards: change the sign of y, in the matrix its second column, and in the area"
                     )
                 raise CalibrationError(f"camera {camera.name}", "ground", found, expected)
-
-
-def _sees(camera: Camera, ground: Floats, height: float) -> Flags:
-    pixel, ahead = camera.project(ground, height)
-    return np.asarray(ahead & camera.inside(pixel))
 
 
 def is_mirrored(camera: Camera, grid: Grid) -> bool:

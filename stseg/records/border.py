@@ -31,8 +31,7 @@ class Border:
         """The border of the views and the doors of `rig`, and of its area unless that is closed."""
         grid, visible = rig.grid, np.zeros(rig.grid.shape[1:], bool)
         for camera in rig.cameras:
-            image, ahead = camera.project(grid.ground, _TRUNK)
-            visible |= ahead & camera.inside(image)
+            visible |= camera.sees(grid.ground, _TRUNK)
         area = visible & grid.inside()
         within = visible | ~grid.inside() if rig.closed else area.copy()
         for door in rig.doors:

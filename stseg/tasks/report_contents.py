@@ -175,8 +175,5 @@ def _view_summaries(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:
 def _ground_seen(camera: Camera, grid: Grid) -> float:
     """Share of the ground that counts over which the camera sees some plane."""
     ground = grid.ground[grid.inside()]
-    visible = np.zeros(len(ground), bool)
-    for height in grid.heights.tolist():
-        pixel, ahead = camera.project(ground, height)
-        visible |= ahead & camera.inside(pixel)
+    visible = np.any([camera.sees(ground, height) for height in grid.heights.tolist()], axis=0)
     return float(visible.mean()) if len(visible) else 0.0

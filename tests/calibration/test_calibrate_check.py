@@ -18,13 +18,15 @@ from stseg.arrays import Boxes, Floats
 from stseg.calibration.check.blunders import match_frames
 from stseg.calibration.check.box_correspondence import isolated_boxes, tables_of
 from stseg.calibration.check.leave_one_out import locate
-from stseg.calibration.check.rig_check import Check, cell_coverage, check_rig, verdict_text
-from stseg.calibration.points.point_fit import Points, fit_points
+from stseg.calibration.check.rig_check import Check, check_rig, verdict_text
+from stseg.calibration.points.camera_models import Points
+from stseg.calibration.points.point_fit import fit_points
 from stseg.commands.calibrate.app import app
 from stseg.commands.main import main
 from stseg.errors import ConfigError, OutputError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
+from stseg.geometry.sampling import Sampling
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source
@@ -146,10 +148,10 @@ class TestBlunders:
 
 
 def test_coverage_counts_views() -> None:
-    has_box = cell_coverage(RIG)
+    has_box = Sampling.of(RIG, "point").views()
     assert has_box.shape == RIG.grid.shape and has_box.max() == 4
     camera = RIG.cameras[0]
-    alone = cell_coverage(replace(RIG, cameras=(camera,)))
+    alone = Sampling.of(replace(RIG, cameras=(camera,)), "point").views()
     pixel, ahead = camera.project(RIG.grid.ground[10, 20], 0.0)
     assert alone[0, 10, 20] == int(ahead and camera.inside(pixel))
 

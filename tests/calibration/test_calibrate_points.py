@@ -7,26 +7,38 @@ import cv2
 import numpy as np
 import pytest
 from hypothesis import given
+from recordings import track, write_recording
 from refusals import refused
-from scenes import looking
+from scenes import looking, rig_of, walkers
 from strategies import BARREL, Pose, poses
 
 from stseg.arrays import Bytes, Floats
-from stseg.calibration.points.point_fit import PointFit, Points, fit_points
+from stseg.calibration.points.camera_models import Points
+from stseg.calibration.points.point_fit import PointFit, fit_points
 from stseg.commands.calibrate.app import app
 from stseg.commands.calibrate.lens import calibrate_lens
 from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
+from stseg.evaluation.scores import evaluate
 from stseg.geometry import Camera, Grid
 from stseg.geometry.fits import fit_homography, focal_of_square_pixels, middle_matrix, vertical_of_matrix
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.calibrations.xml_files import read_opencv_lens
 from stseg.io.recording.rigs import read_recording
+from stseg.io.runfile.runs import read_run
 from stseg.tasks.calibration.points import fit_warnings
 
 SIZE = (640, 480)
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
 SPREAD = np.array([[-1.5, -1.5], [1.5, -1.4], [1.4, 1.5], [-1.5, 1.3], [0.2, 0.1], [-0.6, 0.9], [0.9, -0.5]])
 DOOR = np.array([[-1.5, -1.5], [1.5, -1.4], [0.9, -0.5]])
+
+
+WALL = np.array([[x, 4.0, z] for x in (-1.5, 0.1, 1.5) for z in (1.5, 2.8)])
+OFF_WALL = np.array([[-0.8, 3.0, 2.2], [0.9, 3.2, 1.9]])
+
+
+def measured(view: Camera, place: Floats) -> Points:
+    return Points(view.project(place[:, :2], place[:, 2])[0], place[:, :2], place[:, 2])
 
 
 def camera(turn: float = 0.7, distortion: tuple[float, ...] | None = None) -> Camera:
@@ -37,9 +49,8 @@ def camera(turn: float = 0.7, distortion: tuple[float, ...] | None = None) -> Ca
 def points_of(view: Camera, ground: Floats = SPREAD, high: Floats | None = DOOR) -> Points:
     """Points on the ground, and others two metres above it."""
     high = np.zeros((0, 2)) if high is None else high
-    place = np.concatenate([ground, high])
     height = np.concatenate([np.zeros(len(ground)), np.full(len(high), 2.0)])
-    return Points(view.project(place, height)[0], place, height)
+    return measured(view, np.column_stack([np.concatenate([ground, high]), height]))
 
 
 def fit(points: Points, view: Camera) -> PointFit:
@@ -73,6 +84,27 @@ class TestFit:
         found = fit(points_of(true), true)
         assert found.vertical_from == "points" and off(found.camera, true) < 1e-3
 
+    @pytest.mark.parametrize("askew", [0.0, 2.0])
+    def test_a_wall_stands_for_the_ground(self, askew: float) -> None:
+        true = looking("cam", (0.2, -3.0, 1.6), (0.2 + askew, 4.0, 2.6), SIZE, 520.0)
+        found = fit(measured(true, np.concatenate([WALL, OFF_WALL])), true)
+        assert off(found.camera, true) < 1e-3 and found.inner.low.sum() == len(WALL)
+        assert np.nanmax(found.ground_deviation(GRID)) < 0.5, "the lowest plane that it sees"
+
+    @pytest.mark.parametrize("wrong", [False, True])
+    def test_a_lens_is_found_where_points_bear_it_out(self, wrong: bool) -> None:
+        true = camera(distortion=(-0.25, 0.06))
+        points = points_of(true, np.concatenate([SPREAD, [[1.9, -1.9], [-1.9, 1.9]]]))
+        pixel = points.pixel + np.random.default_rng(5).normal(0, 0.5, points.pixel.shape)
+        pixel[2] += (40.0 * wrong, 0.0)
+        found = fit_points("cam", SIZE, Points(pixel, points.ground, points.height))
+        assert found.vertical_from == "radial lens" and np.flatnonzero(found.out).tolist() == [2] * wrong
+        assert off(found.camera, true) < 8
+
+    def test_a_lens_is_named_where_few_points_hide_it(self) -> None:
+        points = points_of(camera(distortion=BARREL), 1.6 * SPREAD, None)
+        assert any("the lens bends" in word for word in fit_warnings(fit_points("cam", SIZE, points), GRID))
+
     @pytest.mark.parametrize("seed", range(6))
     def test_errors_of_clicks_stay_what_they_are(self, seed: int) -> None:
         true = camera()
@@ -89,7 +121,7 @@ class TestFit:
         pixel = points.pixel + np.random.default_rng(5).normal(0, 0.3, points.pixel.shape)
         pixel[wrong] += (60.0, -45.0)
         found = fit(Points(pixel, points.ground, points.height), true)
-        assert np.flatnonzero(found.out).tolist() == [wrong]
+        assert np.flatnonzero(found.out).tolist() == [wrong] and found.camera.lens is None
         assert off(found.camera, true) < 6
 
     def test_covariance_is_what_repeated_clicks_scatter_by(self) -> None:
@@ -165,7 +197,13 @@ class TestWrongPoints:
         ],
     )
     def test_points_that_fix_nothing_are_named(self, ground: Floats, complaint: str) -> None:
-        refused(CalibrationError, rf"camera cam: points: found {complaint}", fit, points_of(camera(), ground), camera())
+        refused(
+            CalibrationError,
+            rf"camera cam: points: found {complaint}",
+            fit,
+            points_of(camera(), ground, None),
+            camera(),
+        )
 
 
 def table(path: Path, change: Callable[[str, list[float]], list[float]] = lambda _, row: row) -> Path:
@@ -180,7 +218,8 @@ def table(path: Path, change: Callable[[str, list[float]], list[float]] = lambda
 
 
 def run(*tokens: str) -> None:
-    options = ("--size=640,480", "--area=-2,-2,2,2", "--frame-rate=25", "--source-pattern={name}.avi", "-o=room.toml")
+    streams = ("--size=640,480", "--source-pattern={name}.avi") if len(tokens) < 3 else ()
+    options = (*streams, "--area=-2,-2,2,2", "--frame-rate=8", "-o=room.toml")
     app(["points", *tokens, *options], exit_on_error=False, print_error=False, result_action="return_value")
 
 
@@ -211,11 +250,28 @@ class TestCommand:
         nodes = (("camera_matrix", lens.matrix), ("distortion_coefficients", lens.distortion))
         words = [f"<{name}>{' '.join(map(repr, values.ravel().tolist()))}</{name}>" for name, values in nodes]
         Path("cam.xml").write_text(f"<opencv_storage>{''.join(words)}</opencv_storage>")
-        points = points_of(camera(distortion=BARREL), high=None)
+        points = points_of(camera(distortion=BARREL), 1.6 * SPREAD, None)
         rows = [f"cam,{u},{v},{x},{y}" for (u, v), (x, y) in zip(points.pixel, points.ground, strict=True)]
         Path("p.csv").write_text("\n".join(["camera,u,v,x,y", *rows]))
         run("p.csv", "--lens={name}.xml")
         assert off(read_recording("room.toml").rig.cameras[0], camera(distortion=BARREL)) < 0.01
+
+    def test_people_are_tracked_where_no_floor_is_seen(self) -> None:
+        """Cameras at head height look up a little, over the back wall; points of it make the rig."""
+        places = (-3.4, -3.3, 1.6), (0.2, -4.2, 1.7), (3.3, -3.4, 1.5)
+        cameras = [looking(f"c{k}", place, (0.1, 0.2, 2.5), (160, 90), 130.0) for k, place in enumerate(places)]
+        rig = rig_of(cameras)
+        assert not any((camera.inside(camera.project(rig.grid.ground, 0.0)[0])).any() for camera in cameras)
+        write_recording(Path(), 16, rig)
+        lines = ["camera,u,v,x,y,z"]
+        for view in cameras:
+            points = measured(view, np.concatenate([WALL, OFF_WALL]))
+            rows = np.round(np.column_stack([points.pixel, points.place]), 1)
+            lines += [",".join([view.name, *map(str, row)]) for row in rows.tolist()]
+        Path("p.csv").write_text("\n".join(lines))
+        run("p.csv", "--size=160,90", "--source-pattern={name}.csv", "--source-kind=boxes", "--overwrite")
+        assert track(Path("room.toml"), Path("room.h5")) == 0
+        assert float(evaluate(walkers(16), read_run("room.h5").trajectory).moda or 0) >= 95
 
     @pytest.mark.parametrize(
         ("text", "kind", "complaint"),

@@ -17,7 +17,8 @@ from fuzz.corpus import GREY, RAMP, Maker, encoded, text
 from fuzz.mutations import mutated, mutated_objects
 from fuzz.oracles import require_boxes, require_config, require_rig, require_tracks
 from stseg.arrays import Boxes
-from stseg.calibration.points.point_fit import Points, fit_points
+from stseg.calibration.points.camera_models import Points
+from stseg.calibration.points.point_fit import fit_points
 from stseg.commands.calibrate.page import calibrate_page
 from stseg.commands.correct import correct
 from stseg.commands.measure import measure

@@ -48,8 +48,7 @@ class ParticleView:
         width, height = camera.size
         self.step = max(1, -(-width // columns))
         pixel = np.stack(np.meshgrid(np.arange(0, width, self.step), np.arange(0, height, self.step)), -1).astype(float)
-        ideal = pixel if camera.lens is None else camera.lens.undistort(pixel)
-        self.ideal: Singles = np.nan_to_num(ideal, nan=-1e6).astype(np.float32)
+        self.ideal: Singles = np.nan_to_num(camera.ideal(pixel), nan=-1e6).astype(np.float32)
         self.canvas = Canvas.of(*self.ideal.shape[:2])
         self.areas = _AREAS / self.step**2
         self.pixel_buffer: Singles = np.zeros(self.ideal.shape[:2], np.float32)

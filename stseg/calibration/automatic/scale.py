@@ -46,8 +46,7 @@ def measured(solution: SolvedViews, known: Sequence[KnownDistance]) -> Floats:
 
 
 def _measured(solution: SolvedViews, views: Floats, known: KnownDistance, pixels: Floats) -> float:
-    width, height = solution.problem.size[known.view].tolist()
-    ground = on_plane(views[known.view], (width, height), pixels, 0.0)
+    ground = on_plane(views[known.view], solution.problem.size_of(known.view), pixels, 0.0)
     return float(np.linalg.norm(ground[1] - ground[0]))
 
 
@@ -98,8 +97,8 @@ def _size_covariance(solution: SolvedViews, known: Sequence[KnownDistance]) -> F
     feet = [foot[even_rows(len(foot), _FEET)] for foot in feet]
 
     def grounds(views: Floats) -> Floats:
-        sizes = [(int(width), int(height)) for width, height in problem.size]
-        places = [on_plane(view, size, foot, 0.0) for view, size, foot in zip(views, sizes, feet, strict=True)]
+        cameras = enumerate(zip(views, feet, strict=True))
+        places = [on_plane(view, problem.size_of(k), foot, 0.0) for k, (view, foot) in cameras]
         return np.nan_to_num(np.concatenate(places))
 
     here = grounds(views) - grounds(views).mean(axis=0)

@@ -13,7 +13,6 @@ from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.box_correspondence import (
     MATCH_GATE,
     BoxCorrespondences,
-    concatenated,
     match_boxes,
     mismatch,
     wholly_visible,
@@ -46,8 +45,10 @@ def match_frames(
     rig: Rig, tables: Sequence[BodyTable], boxes_by_frame: BoxesByFrame, frames: Sequence[int]
 ) -> BoxCorrespondences:
     """Correspondences of several frames, see `match_boxes`."""
-    none = BoxCorrespondences(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros((0, len(tables), 4)))
-    return concatenated([none, *(match_boxes(rig, tables, frame, boxes_by_frame[frame]) for frame in frames)])
+    nothing = np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros((0, len(tables), 4))
+    found = (match_boxes(rig, tables, frame, boxes_by_frame[frame]) for frame in frames)
+    parts = [nothing, *((one.frame, one.ground, one.height, one.box) for one in found)]
+    return BoxCorrespondences(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def find_swapped_streams(

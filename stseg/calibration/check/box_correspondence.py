@@ -17,6 +17,7 @@ from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.automatic.endpoints import SILHOUETTE_LIKELIHOOD
 from stseg.geometry import Camera, Grid, Rig
+from stseg.geometry.fits import homogeneous
 from stseg.geometry.rig import BODY_HEIGHT
 
 _MIN_HEIGHT, _MAX_HEIGHT = 1.35, 2.10
@@ -87,12 +88,6 @@ def match_boxes(rig: Rig, tables: Sequence[BodyTable], frame: int, boxes: Sequen
     return BoxCorrespondences(np.full(len(selected), frame, np.int64), ground[chosen], height[chosen], box)
 
 
-def concatenated(found: Sequence[BoxCorrespondences]) -> BoxCorrespondences:
-    """Concatenate the correspondences of one or more frames."""
-    parts = [(one.frame, one.ground, one.height, one.box) for one in found]
-    return BoxCorrespondences(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
 def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) -> Floats:
     """Distance between boxes and bodies in one view, in gates; infinite from 1 on.
 
@@ -152,9 +147,8 @@ def _candidates(rig: Rig, boxes: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 def height_of(camera: Camera, ground: Floats, u: Floats, top: Floats) -> Floats:
     """Height of a person at a ground point with the head at row `top`, metres, float64 (n,)."""
-    head = np.stack([u, top], -1)
-    ideal = head if camera.lens is None else camera.lens.undistort(head)
-    foot = np.concatenate([ground, np.ones((len(ground), 1))], 1) @ camera.ground.T
+    ideal = camera.ideal(np.stack([u, top], -1))
+    foot = homogeneous(ground) @ camera.ground.T
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(
             (foot[:, 1] - ideal[:, 1] * foot[:, 2]) / (ideal[:, 1] * camera.vertical[2] - camera.vertical[1])
@@ -162,10 +156,8 @@ def height_of(camera: Camera, ground: Floats, u: Floats, top: Floats) -> Floats:
 
 
 def _in_area(ground: Floats, grid: Grid) -> Flags:
-    x, y = ground[:, 0], ground[:, 1]
-    return np.asarray(
-        (x > grid.x[0] - _MARGIN) & (x < grid.x[1] + _MARGIN) & (y > grid.y[0] - _MARGIN) & (y < grid.y[1] + _MARGIN)
-    )
+    low, high = np.transpose([grid.x, grid.y])
+    return np.asarray(((ground > low - _MARGIN) & (ground < high + _MARGIN)).all(axis=1))
 
 
 def _greedy_selection(residual: Floats, which: Ints) -> list[tuple[int, Ints]]:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Bytes, Floats
+from stseg.arrays import Floats
 from stseg.bodies.pillars import BodyTable
+from stseg.calibration.automatic.endpoints import even_rows
 from stseg.calibration.check.blunders import (
     BoxesByFrame,
     StreamDelay,
@@ -63,7 +64,8 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
     boxes_by_frame
         Boxes of every view in consecutive frames, see `isolated_boxes`.
     """
-    tables, frames = tables_of(rig), checked_frames(sorted(boxes_by_frame))
+    tables, frames = tables_of(rig), sorted(boxes_by_frame)
+    frames = [frames[k] for k in even_rows(len(frames), _MAX_FRAMES)]
     people = match_frames(rig, tables, boxes_by_frame, frames)
     share = confirmations(tables, people)
     lost: tuple[int, ...] = ()
@@ -87,13 +89,6 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
     if shifted:
         verdict, share = judge(rig, tables, people), confirmations(tables, people)
     return Check(verdict, tuple(share.tolist()), lost, None, tuple(shifted), len(people))
-
-
-def checked_frames(frames: Sequence[int]) -> list[int]:
-    """At most `_MAX_FRAMES` of the frames, evenly spread."""
-    if len(frames) <= _MAX_FRAMES:
-        return list(frames)
-    return [frames[k] for k in np.rint(np.linspace(0, len(frames) - 1, _MAX_FRAMES)).astype(int)]
 
 
 def confirmations(tables: Sequence[BodyTable], people: BoxCorrespondences) -> Floats:
@@ -159,13 +154,3 @@ def disagreement_text(name: str, one: Disagreement) -> str:
         f"{name} is off: of {one.people} people it shows {feet} and heads {100 * one.heads:.0f} cm "
         f"from where the others say{where}"
     )
-
-
-def cell_coverage(rig: Rig) -> Bytes:
-    """Number of views that show each cell's centre, uint8 (plane, y, x)."""
-    count = np.zeros(rig.grid.shape, np.uint8)
-    for plane, height in enumerate(rig.grid.heights.tolist()):
-        for camera in rig.cameras:
-            pixel, ahead = camera.project(rig.grid.ground, height)
-            count[plane] += ahead & camera.inside(pixel)
-    return count

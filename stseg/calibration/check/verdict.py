@@ -50,8 +50,6 @@ class Disagreement:
     right: float
     down: float
     """Its mean at the feet: the view's people against the others', metres."""
-    scatter: float
-    """Robust standard deviation around the smoothed disagreement, metres."""
     ground: float
     """Root mean square distance of the feet on the ground, metres."""
     pixels: float
@@ -79,7 +77,6 @@ class _RawDisagreement:
     field: Floats
     """float64 (n, 3): the same of each person: middle to the right, head and feet downwards, metres across the viewing
     ray."""
-    scatter: float
     scale: Floats
     """float64 (n,): pixels a metre at each person."""
     slope: Floats
@@ -104,7 +101,6 @@ class _RawDisagreement:
             heads=_size(field[:, [0, 1]]),
             right=right,
             down=down,
-            scatter=self.scatter,
             ground=_size(moved),
             pixels=_size(feet),
         )
@@ -125,19 +121,9 @@ def _raw_disagreement(
     ground = located.ground[measured]
     middle, planes = _smooth(ground, across[measured])
     field = _on_planes(ground, middle, planes)
-    scatter = 1.4826 * float(np.nanmedian(np.abs(across[measured, 0] - field[:, 0])))
     slope = np.asarray(np.linalg.inv(ground_jacobian(camera, ground, _DIFFERENCE)), float)
-    return _RawDisagreement(
-        view,
-        len(others),
-        confirmed,
-        middle,
-        planes,
-        field,
-        scatter,
-        pixel_height[measured] / located.height[measured],
-        slope,
-    )
+    scale = pixel_height[measured] / located.height[measured]
+    return _RawDisagreement(view, len(others), confirmed, middle, planes, field, scale, slope)
 
 
 def _on_planes(ground: Floats, middle: Floats, planes: Floats) -> Floats:

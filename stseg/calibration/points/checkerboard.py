@@ -11,6 +11,7 @@ import numpy as np
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.automatic.endpoints import even_rows
 from stseg.errors import CalibrationError
+from stseg.geometry import Lens
 
 MIN_VIEWS = 8
 """Views of the board that a calibration needs."""
@@ -23,10 +24,7 @@ _REFINE = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
 class LensFit:
     """A calibrated lens."""
 
-    matrix: Floats
-    """float64 (3, 3): camera matrix."""
-    distortion: Floats
-    """float64 (5,): k1, k2, p1, p2, k3."""
+    lens: Lens
     error: float
     """Root mean square of the reprojection errors, pixels."""
     focal_deviation: float
@@ -78,10 +76,5 @@ def fit_lens(
     error, matrix, distortion, _, _, deviation, _, _ = cv2.calibrateCameraExtended(
         [points] * len(pixels), pixels, size, np.eye(3), np.zeros(5)
     )
-    return LensFit(
-        np.asarray(matrix, float),
-        np.asarray(distortion, float).ravel(),
-        float(error),
-        float(deviation[0, 0]),
-        len(chosen),
-    )
+    lens = Lens(np.asarray(matrix, float), np.asarray(distortion, float))
+    return LensFit(lens, float(error), float(deviation[0, 0]), len(chosen))

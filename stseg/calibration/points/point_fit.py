@@ -1,8 +1,8 @@
-"""One camera from measured points: robust least squares of its homography and vertical.
+"""One camera from measured points: robust least squares of its homography and vertical, or of its pose.
 
-The start is the direct linear transform, or MAGSAC++ where its points agree better (Barath et al., CVPR 2020, OpenCV).
-A Cauchy loss on the reprojection errors in the distorted image finds outliers; the result is least squares over the
-inliers.
+The start is the direct linear transform. A Cauchy loss on the reprojection errors in the distorted image finds
+outliers; the result is least squares over the inliers. All is computed in a frame whose plane z = 0 holds four points:
+the ground, or a wall.
 """
 
 from __future__ import annotations
@@ -10,49 +10,43 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import cv2
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.linalg import rq
 
 from stseg.arrays import Flags, Floats
 from stseg.calibration.pinhole import ground_jacobian
-from stseg.calibration.points.known_intrinsics import fit_pinhole
-from stseg.calibration.points.point_requirements import require_ground, require_right_handed, require_upright
+from stseg.calibration.points.camera_models import (
+    CLICK_SPREAD,
+    ModelFit,
+    Points,
+    fit_model,
+    free_model,
+    outliers,
+    pose_model,
+    pose_start,
+    project,
+)
+from stseg.calibration.points.point_requirements import require_plane, require_unmirrored
+from stseg.calibration.points.radial_lens import fit_radial_lens
+from stseg.calibration.points.reference_plane import in_plane_frame, plane_frame
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera, Grid, Lens
-from stseg.geometry.fits import fit_homography, fit_vertical, focal_of_square_pixels, middle_matrix, vertical_of_matrix
+from stseg.geometry.fits import (
+    fit_homography,
+    fit_vertical,
+    focal_of_square_pixels,
+    homogeneous,
+    middle_matrix,
+    plausible_focal,
+    vertical_of_matrix,
+)
 
-VerticalFrom = Literal["points", "lens", "square pixels"]
+VerticalFrom = Literal["points", "lens", "square pixels", "radial lens"]
 """Source of the vertical."""
-_CLICK_SPREAD = 1.0
-"""Least standard deviation of a clicked pixel, pixels."""
-_MAGSAC_NOISE = 3.0
-"""Greatest noise scale of MAGSAC++, pixels."""
-_OUTLIER_LIMIT = 4.0
-"""Outlier threshold, robust standard deviations."""
 _NOISE_RATIO = 1.5
 """Greatest ratio of noise variances, pose to free homography, for the pose to be preferred."""
 _DIFFERENCE = 1e-3
 """Step of the finite differences on the ground, metres."""
-_MIN_POINTS = 5
-"""Number of points up to which none is rejected."""
-
-
-@dataclass(frozen=True)
-class Points:
-    """Measured points and their pixels in one camera."""
-
-    pixel: Floats
-    """float64 (n, 2)."""
-    ground: Floats
-    """float64 (n, 2): metres."""
-    height: Floats
-    """float64 (n,): metres above the ground."""
-
-    @property
-    def low(self) -> Flags:
-        """Points on the ground, bool (n,)."""
-        return np.asarray(self.height == 0)
 
 
 @dataclass(frozen=True)
@@ -63,119 +57,126 @@ class PointFit:
     points: Points
     """Input of the fit."""
     vertical_from: VerticalFrom
-    """Source: "lens" (its camera matrix) or "square pixels" (centred principal point) where the points agree with it
-    or too few are above the ground; else "points" above the ground."""
+    """Source: "lens" (its camera matrix) or "square pixels" (centred principal point, perhaps with a "radial lens" that
+    the points bear out) where the points agree with it or too few are off the plane of reference; else "points"."""
     off_pixel: Floats
     """float64 (n,): reprojection error of each point, pixels."""
     off_ground: Floats
-    """float64 (n,): the same in the plane at the point's height, metres; nan above the horizon."""
+    """float64 (n,): the same in the plane through the point along that of reference, metres; nan above its horizon."""
     out: Flags
     """bool (n,): outliers."""
-    parameters: Floats
-    covariance: Floats
-    """`parameters`: float64 (k,); `covariance`: float64 (k, k): the homography row by row, then the vertical where
-    points determine it; up to scale."""
+    frame: Floats
+    """float64 (4, 4): from the world to the frame of the plane of reference."""
+    inner: Points
+    """The points in that frame; those of the plane have no height."""
+    model: ModelFit
+    """The camera's model in that frame, and its covariance."""
 
     def ground_deviation(self, grid: Grid) -> Floats:
         """Uncertainty of each ground cell, propagated from the fit's covariance.
 
+        Where the camera sees nothing of the ground, that of the lowest plane that it sees.
+
         Returns
         -------
         float64 (y, x)
-            Standard deviation along the worst direction, metres; nan where the camera does not see the ground.
+            Standard deviation along the worst direction, metres; nan where the camera does not see it.
         """
-        camera, ground = self.camera, grid.ground
-        pixel, ahead = camera.project(ground, 0.0)
-        visible = ahead & camera.inside(pixel) & grid.inside()
-        deviation = np.full(visible.shape, np.nan)
-        if visible.any():
-            level = np.zeros(int(visible.sum()))
-            by_parameters = _slope(self.parameters, ground[visible], level, camera.lens)
-            moved = np.linalg.solve(ground_jacobian(camera, ground[visible], _DIFFERENCE), by_parameters)
-            spread = moved @ self.covariance @ np.swapaxes(moved, 1, 2)
-            deviation[visible] = np.sqrt(np.linalg.eigvalsh(spread)[:, -1])
+        camera, deviation = self.camera, np.full(grid.shape[1:], np.nan)
+        for height in grid.heights.tolist():
+            if (visible := camera.sees(grid.ground, height) & grid.inside()).any():
+                ground = grid.ground[visible]
+                by_unknowns = self._slope(np.column_stack([ground, np.full(len(ground), height)]))
+                moved = np.linalg.solve(ground_jacobian(camera, ground, _DIFFERENCE, height), by_unknowns)
+                spread = moved @ self.model.covariance @ np.swapaxes(moved, 1, 2)
+                deviation[visible] = np.sqrt(np.linalg.eigvalsh(spread)[:, -1])
+                break
         return deviation
+
+    def _slope(self, place: Floats) -> Floats:
+        """Jacobian of the pixels of places (n, 3) in the model's unknowns by finite differences, float64 (n, 2, k)."""
+        unknowns, inner = self.model.unknowns, homogeneous(place) @ self.frame[:3].T
+        steps = np.diag(1e-6 * np.maximum(np.abs(unknowns), 1e-3 * np.abs(unknowns).max()))
+        pixels = [[project(self.model.model, unknowns + side * step, inner) for side in (1, -1)] for step in steps]
+        return np.stack([(one - two) / (2 * step.max()) for (one, two), step in zip(pixels, steps, strict=True)], -1)
 
 
 def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | None = None) -> PointFit:
-    """Fit a camera to at least four points on the ground, and optionally points above it.
+    """Fit a camera to at least four points on the ground or on another plane, and optionally points off it.
 
     Parameters
     ----------
     name, size
         The camera's name, width and height of its image in pixels.
     points
-        Two or more above the ground determine any camera; with fewer, the camera matrix of the lens is used, or
+        Two or more off the plane determine any camera; with fewer, the camera matrix of the lens is used, or
         square pixels and a centred principal point are assumed.
     lens
-        The lens, where it is known.
+        The lens, where it is known; else eight points or more may bear out a radial one.
 
     Raises
     ------
     CalibrationError
-        Where the points determine no camera: fewer than four on the ground, collinear, mirrored, or seen from straight
-        above with no point above the ground.
+        Where the points determine no camera: fewer than four on a plane, collinear, mirrored, or seen along the plane's
+        normal with no point off it.
     """
-    require_ground(name, points.ground[points.low], points.pixel[points.low])
-    ideal = points.pixel if lens is None else lens.undistort(points.pixel)
+    frame = plane_frame(points.place)
+    inner = in_plane_frame(points, frame)
+    require_plane(name, inner.ground[inner.low], inner.pixel[inner.low])
+    ideal = inner.pixel if lens is None else lens.undistort(inner.pixel)
     if not np.isfinite(ideal).all():
-        found = points.pixel[~np.isfinite(ideal).all(axis=1)][0].tolist()
+        found = inner.pixel[~np.isfinite(ideal).all(axis=1)][0].tolist()
         raise CalibrationError(f"camera {name}", "points", f"a pixel {found} beyond its lens's field of view", "others")
-    start = _start(points, ideal)
+    free = _free_fit(inner, ideal, lens)
+    fit, vertical_from = _preferred(free, _pose_fit(free, size, inner, lens), inner, lens)
+    projection, own_lens = fit.model(fit.unknowns)
+    if len(fit.unknowns) == 9:
+        projection[:, 2] = _assumed_vertical(name, projection[:, [0, 1, 3]], size, lens)
+    camera = Camera.from_projection(name, size, projection @ frame, own_lens)
+    require_unmirrored(camera, projection)
+    off = np.hypot(*(camera.project(points.ground, points.height)[0] - points.pixel).T)
+    local = Camera.from_projection(name, size, projection, own_lens)
+    planes = zip(inner.pixel, inner.height.tolist(), strict=True)
+    off_ground = np.hypot(*(np.array([local.back_project(pixel, z) for pixel, z in planes]) - inner.ground).T)
+    return PointFit(camera, points, vertical_from, off, off_ground, outliers(off, fit.used), frame, inner, fit)
+
+
+def _free_fit(points: Points, ideal: Floats, lens: Lens | None) -> ModelFit:
+    """Homography and, where two points or more determine it, the vertical."""
     high = ~points.low
-    vertical_from: VerticalFrom = "points" if high.sum() > 1 else "lens" if lens is not None else "square pixels"
-    free = start.ravel()
-    if vertical_from == "points":
-        free = np.append(free, fit_vertical(start, points.ground[high], points.height[high], ideal[high]))
-    used = np.ones(len(high), bool) if vertical_from == "points" else points.low
-    scale = np.linalg.norm(start[2])
-    robust = _refined(free / scale, points, used, lens)
-    wrong = _outliers(np.hypot(*(_project(robust.x, points.ground, points.height, lens) - points.pixel).T), used)
-    used &= ~wrong
-    fitted = _refined(robust.x, points, used, lens, "linear")
-    parameters, freedom = fitted.x, len(fitted.fun) - (len(fitted.x) - 1)
-    # Noise variance times the pseudo-inverse of J'J: the scale is free.
-    noise = max(float(np.sum(fitted.fun**2)) / max(freedom, 1), _CLICK_SPREAD**2)
-    covariance = np.asarray(noise * np.linalg.pinv(fitted.jac.T @ fitted.jac, rcond=1e-14, hermitian=True))
-    pinhole = fit_pinhole(
-        fitted.x[:9].reshape(3, 3), size, points.ground[used], points.height[used], points.pixel[used], lens
-    )
-    if pinhole is not None and pinhole.noise <= _NOISE_RATIO * noise:
-        parameters, covariance = pinhole.parameters, pinhole.covariance(max(pinhole.noise, _CLICK_SPREAD**2))
-        vertical_from = "square pixels" if lens is None else "lens"
-    ground = parameters[:9].reshape(3, 3)
-    vertical = parameters[9:] if len(parameters) > 9 else _assumed_vertical(name, ground, size, lens)
-    require_right_handed(name, ground, vertical)
-    camera = Camera(name, size, ground, vertical, lens)
-    require_upright(camera)
-    projected, _ = camera.project(points.ground, points.height)
-    off = np.hypot(*(projected - points.pixel).T)
-    out = wrong | _outliers(off, used)
-    ground = [camera.back_project(pixel, z) for pixel, z in zip(points.pixel, points.height.tolist(), strict=True)]
-    off_ground = np.hypot(*(np.array(ground) - points.ground).T)
-    return PointFit(camera, points, vertical_from, off, off_ground, out, parameters, covariance)
+    start = fit_homography(points.ground[points.low], ideal[points.low])
+    unknowns, used = start.ravel(), points.low
+    if high.sum() > 1:
+        vertical = fit_vertical(start, points.ground[high], points.height[high], ideal[high])
+        unknowns, used = np.append(unknowns, vertical), np.ones(len(high), bool)
+    return fit_model(free_model(lens), unknowns / np.linalg.norm(start[2]), points, used)
 
 
-def _outliers(off: Floats, used: Flags) -> Flags:
-    """Outliers against the median of the points in use; none where a camera has few points."""
-    limit = _OUTLIER_LIMIT * max(1.4826 * float(np.median(off[used])), _CLICK_SPREAD)
-    return np.asarray((off > limit) & (used.sum() > _MIN_POINTS))
+def _pose_fit(free: ModelFit, size: tuple[int, int], points: Points, lens: Lens | None) -> ModelFit | None:
+    """The pose of a camera with that lens, or square pixels and a centred axis; None where its focal length is open."""
+    projection, _ = free.model(free.unknowns)
+    homography = projection[:, [0, 1, 3]]
+    if lens is not None:
+        return fit_model(pose_model(size, lens), pose_start(homography, lens.matrix), points, free.used, robust=False)
+    focal = focal_of_square_pixels(homography, size)
+    if focal is None and len(free.unknowns) > 9:
+        across, down, depth = np.abs(np.diag(rq(projection[:, :3])[0]))
+        focal = plausible_focal(float(np.sqrt(across * down) / max(depth, 1e-300)), size)
+    if focal is None:
+        return None
+    start = np.append(pose_start(homography, middle_matrix(focal, size)), np.log(focal / size[0]))
+    return fit_model(pose_model(size, None), start, points, free.used, robust=False)
 
 
-def _start(points: Points, ideal: Floats) -> Floats:
-    """Initial homography: direct linear transform, or MAGSAC++ where its median error is smaller."""
-    ground, pixel = points.ground[points.low], ideal[points.low]
-    starts = [fit_homography(ground, pixel)]
-    if len(ground) > 4:
-        middle, reach = ground.mean(axis=0), ground.std()
-        found, _ = cv2.findHomography((ground - middle) / reach, pixel, cv2.USAC_MAGSAC, _MAGSAC_NOISE, maxIters=10_000)
-        if found is not None:
-            unit = np.array([[1 / reach, 0, -middle[0] / reach], [0, 1 / reach, -middle[1] / reach], [0, 0, 1]])
-            homography = np.asarray(found, float) @ unit
-            depth = ground @ homography[2, :2] + homography[2, 2]
-            starts.append(homography if np.median(depth) > 0 else -homography)
-    misses = [_project(start.ravel(), ground, np.zeros(len(ground)), None) - pixel for start in starts]
-    return min(zip(misses, starts, strict=True), key=lambda one: float(np.median(np.hypot(*one[0].T))))[1]
+def _preferred(
+    free: ModelFit, pose: ModelFit | None, points: Points, lens: Lens | None
+) -> tuple[ModelFit, VerticalFrom]:
+    bent = fit_radial_lens(pose, free, points) if pose is not None and lens is None else None
+    if bent is not None:
+        return bent, "radial lens"
+    if pose is not None and pose.noise <= _NOISE_RATIO * max(free.noise, CLICK_SPREAD**2):
+        return pose, "square pixels" if lens is None else "lens"
+    return free, "points" if len(free.unknowns) > 9 else "square pixels" if lens is None else "lens"
 
 
 def _assumed_vertical(name: str, ground: Floats, size: tuple[int, int], lens: Lens | None) -> Floats:
@@ -186,41 +187,7 @@ def _assumed_vertical(name: str, ground: Floats, size: tuple[int, int], lens: Le
         raise CalibrationError(
             f"camera {name}",
             "points",
-            "a view that leaves its focal length open, and fewer than two points above the ground",
-            "two or more points with z above 0, such as the top of a door, or --lens",
+            "a view that leaves its focal length open, and fewer than two points off the plane of the others",
+            "two or more points with z above 0, such as the top of a door, or off their wall, or --lens",
         )
     return vertical_of_matrix(ground, middle_matrix(focal, size))
-
-
-def _refined(
-    start: Floats, points: Points, used: Flags, lens: Lens | None, loss: Literal["cauchy", "linear"] = "cauchy"
-) -> OptimizeResult:
-    """Least-squares (or Cauchy) refinement over the points in use."""
-    ground, height, pixel = points.ground[used], points.height[used], points.pixel[used]
-
-    def miss(parameters: Floats) -> Floats:
-        return (_project(parameters, ground, height, lens) - pixel).ravel()
-
-    spread = 1.4826 * float(np.median(np.abs(miss(start))))
-    return least_squares(miss, start, x_scale="jac", loss=loss, f_scale=max(spread, _CLICK_SPREAD), max_nfev=500)
-
-
-def _project(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None) -> Floats:
-    """Pixels of points under the parameters of `PointFit`, float64 (n, 2)."""
-    image = np.concatenate([ground, np.ones((len(ground), 1))], 1) @ parameters[:9].reshape(3, 3).T
-    if len(parameters) > 9:
-        image = image + height[:, None] * parameters[9:]
-    pixel = image[:, :2] / image[:, 2:]
-    return pixel if lens is None else lens.distort(pixel)[0]
-
-
-def _slope(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None) -> Floats:
-    """Jacobian of pixels in the parameters by finite differences, float64 (n, 2, k)."""
-    step = 1e-6 * np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max())
-    columns = []
-    for k, size in enumerate(step):
-        move = np.zeros_like(parameters)
-        move[k] = size
-        later = _project(parameters + move, ground, height, lens)
-        columns.append((later - _project(parameters - move, ground, height, lens)) / (2 * size))
-    return np.stack(columns, -1)

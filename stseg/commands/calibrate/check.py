@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.table import Table
 
 from stseg.commands.terminal.standard_error import TerminalReporter
-from stseg.commands.terminal.standard_output import output_console
+from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.rigs import read_recording
@@ -72,12 +71,7 @@ def check(
 
 def _print(found: RigCheck) -> None:
     console = output_console()
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for name in COLUMNS:
-        table.add_column(name, justify="left" if name == "camera" else "right")
-    for row in found.rows():
-        table.add_row(*row)
-    console.print(table)
+    console.print(table_of(COLUMNS, found.rows()))
     console.print(READING, style="dim", soft_wrap=True)
     for sentence in found.verdict:
         console.print(sentence, style=None if found.sound else "yellow", soft_wrap=True)

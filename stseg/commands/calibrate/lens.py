@@ -71,8 +71,9 @@ def calibrate_lens(
     finally:
         stream.close()
     fit = fit_lens(str(video), found, (columns, rows), square, size)
-    write_opencv_lens(output, fit.matrix, fit.distortion, overwrite)
+    write_opencv_lens(output, fit.lens, overwrite)
+    focal, (u, v) = fit.lens.matrix[0, 0], fit.lens.matrix[:2, 2]
     print(
-        f"{output}: focal length {fit.matrix[0, 0]:.1f} ± {fit.focal_deviation:.1f} px, axis at "
-        f"({fit.matrix[0, 2]:.1f}, {fit.matrix[1, 2]:.1f}), {fit.views} views off by {fit.error:.2f} px"
+        f"{output}: focal length {focal:.1f} ± {fit.focal_deviation:.1f} px, axis at ({u:.1f}, {v:.1f}), "
+        f"{fit.views} views off by {fit.error:.2f} px"
     )

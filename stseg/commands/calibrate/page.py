@@ -11,7 +11,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.arrays import Bytes
-from stseg.commands.calibrate.scene import numbers
+from stseg.commands.calibrate.scene import area_of
 from stseg.errors import ConfigError, SourceError
 from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.recording.pictures import read_colour
@@ -61,9 +61,7 @@ def calibrate_page(
     names = camera_names(videos)
     if not videos or len(set(names)) < len(names):
         raise ConfigError("calibrate page", "VIDEO", ", ".join(map(str, videos)), "one or more, with different names")
-    x0, y0, x1, y1 = numbers("--area", area, "4 numbers x0,y0,x1,y1", 4)
-    if not (x0 < x1 and y0 < y1):
-        raise ConfigError("--area", "", repr(area), "x0,y0,x1,y1 with x0 below x1 and y0 below y1")
+    x0, y0, x1, y1 = area_of(area)
     frames = [_frames(path, frame) for path in videos]
     command = _next_command(videos, [one[0] for one in frames], area)
     floor = _plan(plan, x1 - x0, y1 - y0)

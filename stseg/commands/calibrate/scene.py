@@ -115,6 +115,14 @@ def size_of(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+def area_of(text: str) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 of an area, metres."""
+    found = parse_numbers(text.split(","), limits.METRES)
+    if found is None or len(found) != 4 or not (found[0] < found[2] and found[1] < found[3]):
+        raise ConfigError("--area", "", abbreviated(text), "x0,y0,x1,y1 in metres with x0 below x1 and y0 below y1")
+    return found[0], found[1], found[2], found[3]
+
+
 def words(option: str, text: str, count: int) -> list[str]:
     """A number of words between commas."""
     found = [word.strip() for word in text.split(",")]

@@ -152,11 +152,8 @@ def _view_directions(camera: Camera) -> Floats | None:
 
     float64 (k, 2), unit length; the one in the middle is that of the middle of the view's angle.
     """
-    matrix = camera.projection[:, :3]
     width, height = camera.size
-    pixel = np.array([[0.0, height / 2], [width / 2, height / 2], [width - 1.0, height / 2]])
-    ideal = pixel if camera.lens is None else camera.lens.undistort(pixel)
-    ray = np.linalg.solve(matrix, np.concatenate([ideal, np.ones((3, 1))], axis=1).T).T
+    ray = camera.rays(np.array([[0.0, height / 2], [width / 2, height / 2], [width - 1.0, height / 2]]))
     length = np.hypot(ray[:, 0], ray[:, 1])
     if not np.isfinite(ray).all() or (length < 0.2 * np.linalg.norm(ray, axis=1)).any():
         return None

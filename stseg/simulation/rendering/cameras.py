@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Floats, Singles
+from stseg.arrays import Singles
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.simulation.scene import SceneSpec, Topic, random_stream
 
@@ -74,8 +74,5 @@ def pixel_rays(camera: Camera) -> Singles:
     """
     width, height = camera.size
     pixel = np.stack(np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float)), -1)
-    ideal: Floats = pixel if camera.lens is None else camera.lens.undistort(pixel)
-    toward = np.linalg.inv(camera.projection[:, :3])
-    rays = np.concatenate([ideal, np.ones_like(ideal[..., :1])], -1) @ toward.T
     # Times the scale that makes the third coordinate of P (X, 1) a depth in metres.
-    return np.asarray(np.nan_to_num(rays * float(np.linalg.norm(camera.projection[2, :3]))), np.float32)
+    return np.asarray(np.nan_to_num(camera.rays(pixel) * float(np.linalg.norm(camera.projection[2, :3]))), np.float32)

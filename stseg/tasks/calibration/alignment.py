@@ -10,9 +10,10 @@ from typing import Literal
 import numpy as np
 
 from stseg.arrays import Floats
+from stseg.calibration.automatic.endpoints import even_rows
 from stseg.engine.recordings import recording_of
 from stseg.errors import CalibrationError, ConfigError
-from stseg.geometry import Camera, Rig
+from stseg.geometry import Rig
 from stseg.geometry.ground_motion import GroundMotion, fit_motion
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.outputs.whole_files import Inputs, require_output
@@ -20,8 +21,8 @@ from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.recording.source_files import recording_files
 
-_SAMPLES = 12
-"""Pixels along each side of an image that two rigs are compared at."""
+_SAMPLES = 500
+"""Most places that two rigs are compared at."""
 _MIRRORED = 0.3
 """Residual of a mirrored fit over that of the fit, below which points are of a mirrored ground."""
 
@@ -105,7 +106,7 @@ def align_rig(
     recording = recording_of(rig)
     require_output(output, overwrite, Inputs([reference, recording.path], recording_files(recording)))
     if reference.suffix.lower() == ".toml":
-        found = _shared_pixels(recording.rig, read_recording(reference).rig, reference)
+        found = _shared_places(recording.rig, read_recording(reference).rig, reference)
     else:
         found = _known_points(recording.rig, reference, metres_per_pixel)
     source, target = np.array([one[2] for one in found]), np.array([one[3] for one in found])
@@ -142,35 +143,23 @@ def _known_points(rig: Rig, path: Path, metres_per_pixel: float | None) -> list[
     return found
 
 
-def _shared_pixels(rig: Rig, other: Rig, path: Path) -> list[_Point]:
-    """Pixels of shared cameras that show the area, and their places in both rigs."""
-    others = {camera.name: camera for camera in other.cameras}
-    found: list[_Point] = []
-    for camera in rig.cameras:
-        if camera.name in others:
-            found += _camera_pixels(rig, camera, others[camera.name])
+def _shared_places(rig: Rig, other: Rig, path: Path) -> list[_Point]:
+    """Places of the area that shared cameras show, and where the other rig sees them."""
+    others, found = {camera.name: camera for camera in other.cameras}, list[_Point]()
+    ground = rig.grid.ground[rig.grid.inside()]
+    ground = ground[even_rows(len(ground), _SAMPLES)]
+    for camera in (one for one in rig.cameras if one.name in others):
+        place = others[camera.name].back_project(camera.project(ground, 0.0)[0])
+        visible = camera.sees(ground, 0.0) & np.isfinite(place).all(axis=1)
+        found += [(camera.name, 0, *pair) for pair in zip(ground[visible], place[visible], strict=True)]
     if not found:
         raise CalibrationError(path, "camera", ", ".join(others), "a camera of the same name, with a view of the area")
     return found
 
 
-def _camera_pixels(rig: Rig, camera: Camera, other: Camera) -> list[_Point]:
-    across, down = (np.linspace(0, side - 1, _SAMPLES) for side in camera.size)
-    pixel = np.stack(np.meshgrid(across, down), -1).reshape(-1, 2)
-    ground, place = camera.back_project(pixel), other.back_project(pixel)
-    (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
-    with np.errstate(invalid="ignore"):
-        inside = (ground >= [x0, y0]).all(axis=1) & (ground <= [x1, y1]).all(axis=1) & np.isfinite(place).all(axis=1)
-    return [(camera.name, 0, one, two) for one, two in zip(ground[inside], place[inside], strict=True)]
-
-
 def _require_determined(path: Path, source: Floats, target: Floats, away: Floats) -> None:
     """Raise CalibrationError for points of one place, and for those of a mirrored ground."""
-    if (
-        len(source) < 2
-        or not np.linalg.norm(np.ptp(source, axis=0)) > 0
-        or not np.linalg.norm(np.ptp(target, axis=0)) > 0
-    ):
+    if len(source) < 2 or not all(np.ptp(places, axis=0).any() for places in (source, target)):
         raise CalibrationError(path, "", f"{len(source)} points of one place", "two or more places")
     mirror = np.array([1.0, -1.0])
     motion = fit_motion(source, target * mirror, True)

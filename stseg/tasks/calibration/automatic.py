@@ -10,13 +10,7 @@ from typing import Literal
 import numpy as np
 
 from stseg.arrays import Bytes, Floats
-from stseg.calibration.adjusted_rig import (
-    ViewReport,
-    cameras_of,
-    grid_of,
-    offsets_of,
-    reports_of,
-)
+from stseg.calibration.adjusted_rig import ViewReport, cameras_of, grid_of, offsets_of, reports_of
 from stseg.calibration.automatic.auto import calibrate_from_people, sharpen_by_floor, steps_of
 from stseg.calibration.automatic.endpoints import Endpoints, concatenate_endpoints, upright_endpoints
 from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measured, scale_spread, scaled_to

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from stseg.arrays import Floats, Observation
 from stseg.calibration.check.box_correspondence import isolated_boxes
-from stseg.calibration.check.rig_check import Check, cell_coverage, verdict_text
+from stseg.calibration.check.rig_check import Check, verdict_text
 from stseg.calibration.check.rig_check import check_rig as check_boxes
 from stseg.calibration.check.verdict import Disagreement
 from stseg.config import Config
@@ -18,6 +18,7 @@ from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.recordings import recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
+from stseg.geometry.sampling import Sampling
 from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
@@ -106,7 +107,7 @@ class RigCheck:
             for camera, view in views
         ]
         words = "How many views see each ground cell at some height."
-        return [*grids, Figure("coverage", blind_map(rig, cell_coverage(rig)), words)]
+        return [*grids, Figure("coverage", blind_map(rig, Sampling.of(rig, "point").views()), words)]
 
     def write_page(self, output: Path, overwrite: bool = False) -> None:
         """Write verdict and pictures as one HTML page, which holds images of the cameras."""

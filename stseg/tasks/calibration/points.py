@@ -10,7 +10,9 @@ from typing import Literal
 import numpy as np
 
 from stseg.arrays import Ints
-from stseg.calibration.points.point_fit import PointFit, Points, fit_points
+from stseg.calibration.points.camera_models import Points
+from stseg.calibration.points.point_fit import PointFit, fit_points
+from stseg.calibration.points.radial_lens import MIN_POINTS
 from stseg.engine.recordings import AnySource, camera_source
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Grid, Rig
@@ -21,6 +23,8 @@ from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
 
+_LENS_NOISE = 9.0
+"""Variance of a pixel from which on the lens is a suspect, square pixels."""
 _UNCERTAIN_SHARE = 0.01
 """Share of a camera's ground that may be uncertain without a warning."""
 
@@ -65,7 +69,8 @@ def calibrate_points(
     Parameters
     ----------
     points
-        CSV with the columns camera,u,v,x,y and perhaps z: pixels (u to the right, v down), and places on the ground.
+        CSV with the columns camera,u,v,x,y and perhaps z: pixels (u to the right, v down), and places. Four of each
+        camera lie on one plane: the ground, or a wall.
     output
         The rig file to write.
     size
@@ -83,6 +88,7 @@ def calibrate_points(
         Unit of x, y and z.
     lens
         OpenCV XML with `camera_matrix` and `distortion_coefficients` of each camera, `{name}` standing for its name.
+        Without it, a radial lens is fitted where eight points or more bear it out.
     overwrite
         Replace the rig file if it exists.
 
@@ -140,6 +146,11 @@ def fit_warnings(fit: PointFit, grid: Grid) -> list[str]:
             f"worse than to a cell, and at ({x:.1f}, {y:.1f}) m only to {100 * deviation[row, column]:.0f} cm (one "
             "standard deviation): add points there"
         )
-    if int(fit.points.low.sum()) == 4:
+    if int(fit.inner.low.sum()) == 4:
         words.append(f"{fit.camera.name}: four points fit any camera: a fifth would show whether they are right")
+    if fit.camera.lens is None and (fit.out.any() or fit.model.noise > _LENS_NOISE):
+        words.append(
+            f"{fit.camera.name}: points that do not fit may be right where the lens bends straight lines: give --lens, "
+            f"or more points up to the image's corners (a lens is fitted from {MIN_POINTS} on)"
+        )
     return words
