@@ -20,6 +20,8 @@ _PATCH_SPACING = 0.08
 """Spacing of the patch, metres: a third of the offset of two lattice places."""
 _AXIS = np.arange(-2, 3) * _PATCH_SPACING
 _PATCH = np.stack(np.meshgrid(_AXIS, _AXIS), -1).reshape(-1, 2)
+_HEIGHT_STEPS = 0.03 * np.arange(-3, 4)
+"""Steps from a candidate's height, in shares of it: those of the search, 0.1 m, would attract all heights between."""
 _HEIGHT_LIMIT = 4
 """Where pixels show the height afterwards (`body_sizes`), every other of more heights is enough here."""
 _MINIMUM_BOX_LOG_LIKELIHOOD = -8.0
@@ -70,9 +72,7 @@ def refine_places_and_heights(
     `track_index` int64 (n,) is the predicted track that each person continues, -1 for births.
     """
     views, prior = evidence.views, evidence.prior
-    heights = np.asarray(prior.body.heights)
-    if len(heights) > _HEIGHT_LIMIT and not any(isinstance(view, BoxView) for view in views):
-        heights = heights[::2]
+    heights = _tried_heights(pool, evidence)
     patch = pool.ground[:, None] + _PATCH
     if all(isinstance(view, BoxView) for view in views) and len(pool):
         score = _cached_scores(pool, evidence, assignment, heights)
@@ -81,6 +81,14 @@ def refine_places_and_heights(
     tracked = np.flatnonzero(track_index >= 0)
     score[tracked] += prior.predicted.place_log_density(track_index[tracked], patch[tracked])[:, None]
     return _posterior(score, patch, heights)
+
+
+def _tried_heights(pool: Candidates, evidence: FrameEvidence) -> Floats:
+    """Heights that are tried for each person, float64 (person, height), metres, rising."""
+    if any(isinstance(view, BoxView) for view in evidence.views):
+        return pool.height[:, None] * (1.0 + _HEIGHT_STEPS)
+    heights = np.asarray(evidence.prior.body.heights)
+    return np.tile(heights[::2] if len(heights) > _HEIGHT_LIMIT else heights, (len(pool), 1))
 
 
 def refine_places(
@@ -106,17 +114,18 @@ def _cached_scores(
 ) -> Floats:
     """`_scores` of people in views that all deliver boxes: in a frame many keep their place and their boxes."""
     cache = evidence.patch_scores
-    names = [place.tobytes() + box.tobytes() for place, box in zip(pool.ground, assignment.box.T, strict=True)]
+    starts = zip(pool.ground, heights, assignment.box.T, strict=True)
+    names = [place.tobytes() + tall.tobytes() + box.tobytes() for place, tall, box in starts]
     uncached = np.array([j for j, name in enumerate(names) if name not in cache], int)
     if len(uncached):
-        scores = _scores(pool.at(uncached), evidence, assignment.of(uncached), heights)
+        scores = _scores(pool.at(uncached), evidence, assignment.of(uncached), heights[uncached])
         cache.update(zip((names[j] for j in uncached), scores, strict=True))
     return np.stack([cache[name] for name in names])
 
 
 def _scores(pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, heights: Floats) -> Floats:
     """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
-    score = np.tile(evidence.prior.log_height(heights)[:, None], (len(pool), 1, len(_PATCH)))
+    score = np.repeat(evidence.prior.log_height(heights)[..., None], len(_PATCH), 2)
     pillars = _pillars(evidence.views[0], pool.ground[:, None] + _PATCH, heights, pool.width)
     for k, (view, observation) in enumerate(zip(evidence.views, evidence.observations, strict=True)):
         if observation is not None and len(pool):
@@ -125,11 +134,11 @@ def _scores(pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssig
 
 
 def _posterior(score: Floats, patch: Floats, heights: Floats) -> RefinedPlaces:
-    """Means and variances from scores (person, height, place) of patches (person, place, 2), nats and metres."""
+    """Means and variances from scores (person, height, place) of patches (person, place, 2) and heights, metres."""
     weight = np.exp(score - score.max((1, 2), keepdims=True))
-    total = weight.reshape(len(score), len(heights) * patch.shape[1]).sum(1)[:, None]
+    total = weight.reshape(len(score), heights.shape[1] * patch.shape[1]).sum(1)[:, None]
     of_place, of_height = weight.sum(1) / total, weight.sum(2) / total
-    height = of_height @ heights
+    height = (of_height * heights).sum(1)
     variance = (of_height * (heights - height[:, None]) ** 2).sum(1)
     return RefinedPlaces(*_moments(of_place, patch), height, variance)
 
@@ -143,11 +152,9 @@ def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
 
 
 def _pillars(view: View, patch: Floats, heights: Floats, width: Floats) -> TriedPillars:
-    """Pillars of all heights, then of all places of a patch (person, place, 2), for each person."""
-    people, places = patch.shape[:2]
-    ground = np.repeat(patch[:, None], len(heights), 1).reshape(people, len(heights) * places, 2)
-    tall = np.tile(np.repeat(heights, places), (people, 1))
-    return view.tried(ground, tall, np.repeat(width[:, None], tall.shape[1], 1))
+    """Pillars of all heights (person, height), then of all places of a patch (person, place, 2), for each person."""
+    tall = np.repeat(heights, patch.shape[1], 1)
+    return view.tried(np.tile(patch, (1, heights.shape[1], 1)), tall, np.repeat(width[:, None], tall.shape[1], 1))
 
 
 def _patch_score(
