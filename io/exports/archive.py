@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -36,15 +37,14 @@ _TABLES = {
 def write_sqlite(path: Path, runs: Sequence[Run]) -> None:
     """Write an SQLite database."""
     path.unlink(missing_ok=True)
-    connection = sqlite3.connect(path)
     try:
-        with connection:
-            rows = _fill(connection, runs)
-        _require_rows(connection, rows)
+        with closing(sqlite3.connect(path)) as connection:
+            connection.execute("PRAGMA journal_mode = OFF")  # nothing lies beside the part of a killed command
+            with connection:
+                rows = _fill(connection, runs)
+            _require_rows(connection, rows)
     except sqlite3.Error as error:
         raise OSError(errno.EIO, str(error)) from error
-    finally:
-        connection.close()
 
 
 def write_duckdb(path: Path, runs: Sequence[Run]) -> None:

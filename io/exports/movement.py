@@ -143,7 +143,7 @@ def write_jupedsim(path: Path, run: Run) -> None:
     columns = [table[name].tolist() for name in ("frame", "id", "x", "y")] + headings(table).T.tolist()
     path.write_bytes(b"")  # SQLite would add to what is there
     with closing(sqlite3.connect(path)) as database, database:
-        database.executescript(_JUPEDSIM_TABLES)
+        database.executescript(f"PRAGMA journal_mode = OFF; {_JUPEDSIM_TABLES}")
         database.executemany("INSERT INTO metadata VALUES(?, ?)", [(key, str(value)) for key, value in about.items()])
         database.execute("INSERT INTO geometry VALUES(?, ?)", (_ONLY_AREA, area))
         database.executemany(

@@ -26,6 +26,7 @@ from stseg.io.untrusted.bounded_files import is_regular
 _ABANDONED = 3600.0
 """Time without a change after which an unlocked part belongs to a killed process, seconds."""
 _FRAME = re.compile(r"\d{6,}\.png", re.ASCII)
+_FRAME_PART = re.compile(rf"{_FRAME.pattern}\.[0-9a-f]{{16}}\.part", re.ASCII)
 _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 MARK = b"made by stseg"
 """In every file of ours whose format has room for it."""
@@ -174,7 +175,7 @@ def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
     require_new(path, overwrite)
     part: Path | None = None
     try:
-        _remove_abandoned(path)
+        _remove_abandoned(parts_of(path))
         part, descriptor = create_part(path)
         os.close(descriptor)
         yield part
@@ -218,10 +219,11 @@ def clear_frames(folder: Path, inputs: Inputs = NO_INPUTS) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for file in require_own_frames(folder, inputs):
         file.unlink()
+    _remove_abandoned(file for file in folder.glob("*.part") if _FRAME_PART.fullmatch(file.name) and is_regular(file))
 
 
-def _remove_abandoned(path: Path) -> None:
-    for part in parts_of(path):
+def _remove_abandoned(parts: Iterable[Path]) -> None:
+    for part in parts:
         with suppress(OSError):
             if abs(time.time() - part.stat().st_mtime) > _ABANDONED:  # a clock may have been set back meanwhile
                 part.unlink()

@@ -96,7 +96,8 @@ class CutTracker:
         ]
         tracklets = form_tracklets(blobs, window.solve_first, self.config.tracking)
         decision = self.association.decide(window, blobs, tracklets)
-        row = np.array([(*_ranges(window), energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
+        frames_of = window.index, window.solve_first, window.solve_stop, window.commit_first, window.commit_stop
+        row = np.array([(*frames_of, energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
         return self._commit(window, frames, patches, label, blobs, decision, row)
 
@@ -196,7 +197,3 @@ class CutTracker:
             width[detected] = wide[detections]
         tracks = TrackPlaces(identity[named], ground, covariance, height, width, score)
         return trajectory_rows(fused.frame, tracks, blobs.extent[named], views_at(self.rig, ground))
-
-
-def _ranges(window: Window) -> tuple[int, int, int, int, int]:
-    return window.index, window.solve_first, window.solve_stop, window.commit_first, window.commit_stop

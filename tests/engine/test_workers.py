@@ -14,7 +14,7 @@ from typing import Any
 import distributed
 import pytest
 from cluster import Cluster, started_cluster
-from recordings import ENVIRONMENT, FRAMES, assert_same, compiled_only, run_words, track, write_recording
+from recordings import ENVIRONMENT, FRAMES, assert_same, compiled_only, process, run_words, track, write_recording
 from refusals import Command
 from scenes import corner_cameras, rig_of
 
@@ -159,3 +159,7 @@ def test_a_ground_beyond_the_memory_is_refused(
         with pytest.raises(ConfigError) as error:
             called()
         assert key in str(error.value) and remedy in str(error.value) and "8.0 GiB that are free" in str(error.value)
+
+
+def test_nothing_is_imported_for_a_command_that_has_ended() -> None:
+    assert process("import stseg.engine.workers.preloaded", STSEG_COMMAND="0").returncode == 1

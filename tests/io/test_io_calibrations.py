@@ -321,7 +321,7 @@ class TestCommand:
             ("--size=640.5,480", ConfigError, r"--size: found '640.5,480'"),
             ("--names=a", ConfigError, r"--names: found 1 of them, expected 2"),
             ("--names=a,a", RigError, r"camera\[1\].name: found 'a'"),
-            ("--sources=a,b", ConfigError, r"found both or neither"),
+            ("--sources=a,b", ConfigError, r"found both, expected one"),
             ("--source-pattern=a.avi", ConfigError, r"--source-pattern: found 'a.avi', expected a path with"),
             ("--first-frame=1", ConfigError, r"--first-frame: found --source-kind video"),
             ("--score=0.3", ConfigError, r"--score: found --source-kind video"),

@@ -1,5 +1,6 @@
 """Label images on disk, and the command that writes them."""
 
+import os
 from pathlib import Path
 
 import cv2
@@ -117,8 +118,12 @@ def test_every_frame_of_every_camera_has_an_image_of_ids(run_path: Path, tmp_pat
 def test_frames_keep_their_numbers_and_their_labels(run_path: Path, tmp_path: Path) -> None:
     whole, part = tmp_path / "whole", tmp_path / "part"
     assert main(["labels", str(run_path), "-o", str(whole)]) == 0
-    assert main(["labels", str(run_path), "-o", str(part), "--frames", "2:"]) == 0
-    assert sorted(path.name for path in (part / "east").iterdir()) == ["000002.png", "000003.png"]
+    (part / "east").mkdir(parents=True)
+    for name in ("000001.png.0123456789abcdef.part", "mine.part"):  # the first one is of a killed command
+        (part / "east" / name).touch()
+        os.utime(part / "east" / name, (0, 0))
+    assert main(["labels", str(run_path), "-o", str(part), "--frames", "2:", "--overwrite"]) == 0
+    assert sorted(path.name for path in (part / "east").iterdir()) == ["000002.png", "000003.png", "mine.part"]
     for path in part.glob("*/*.png"):
         assert path.read_bytes() == (whole / path.parent.name / path.name).read_bytes()
 

@@ -70,9 +70,10 @@ def interpret_stamps(
     if any(np.isnan(stamps[:1]).any() for stamps in times):
         return None
     files = [(stamps - stamps[:1]) / 1000 * frame_rate for stamps in times]
-    if not all(np.isfinite(stamps).all() and _rises(np.diff(stamps), _LONGEST_GAP * frame_rate) for stamps in files):
-        return None
     steps = np.concatenate([np.diff(stamps) for stamps in files])
+    rises = ((steps > 0) & (steps < _LONGEST_GAP * frame_rate)).all()
+    if not rises or not all(np.isfinite(stamps).all() for stamps in files):
+        return None
     if not len(steps):
         return TimeStamps(concatenate_files(files, 1.0, frame_rate, paths, starts), 1.0, True)
     mean = float(steps.mean())
@@ -102,10 +103,6 @@ def unpack_stamps(packed: Floats | Ints) -> Floats:
 def have_stamps(times: Sequence[Floats], paths: Sequence[Path]) -> bool:
     """Whether a camera's files have a time stamp for each frame."""
     return all(np.isfinite(stamps).all() for stamps in times) and not any(map(_is_avi, paths))
-
-
-def _rises(steps: Floats, gap: float) -> bool:
-    return bool(((steps > 0) & (steps < gap)).all())
 
 
 def concatenate_files(

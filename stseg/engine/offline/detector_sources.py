@@ -62,7 +62,8 @@ def _detect(recording: Recording, boxes: dict[int, DetectedBoxes], folder: Path,
         make_detector(recording.sources[k].source)  # refused before hours of work, and before anything is written
     make_folder(folder)
     with reporter.progress("counting", None):
-        streams = index_streams(replace(recording, sources=tuple(map(_without_detector, recording.sources))))
+        feeds = [replace(feed, source=feed.source.without_detector()) for feed in recording.sources]
+        streams = index_streams(replace(recording, sources=tuple(feeds)))
     for note in streams.notes:
         reporter.note(note)
     frames = {k: sum(map(len, streams.times[k])) for k in boxes}
@@ -84,10 +85,6 @@ def _kept(boxes: dict[int, DetectedBoxes], reporter: Reporter) -> Iterator[None]
             folder = next(iter(boxes.values())).path.parent
             reporter.note(f"the boxes of {frames} frames are kept in {folder}; the same command goes on from there")
         raise
-
-
-def _without_detector(feed: CameraSource) -> CameraSource:
-    return replace(feed, source=feed.source.without_detector())
 
 
 def _with_boxes(feed: CameraSource, boxes: DetectedBoxes) -> CameraSource:

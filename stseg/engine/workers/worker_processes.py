@@ -7,6 +7,7 @@ at the same time as the process of the command does.
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable
 from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
@@ -40,6 +41,7 @@ def prepare_workers(workers: int | None) -> None:
         from multiprocessing import forkserver
 
         CONTEXT.set_forkserver_preload([_PRELOADED])
+        os.environ["STSEG_COMMAND"] = str(os.getpid())
         with SafeChildren():
             forkserver.ensure_running()
 

@@ -176,8 +176,8 @@ _IMAGES = (
 )
 _CERTAINTY = note(
     "A person: how certain its points are people, on average. Exchanged: the chance that the track shows another "
-    "person for a second or more. Expected calibration errors: 0.02 of the former; 0.03 of the latter on the recordings "
-    "it was fitted to, about 0.1 on others."
+    "person for a second or more. Expected calibration errors: 0.02 of the former; 0.03 of the latter on the "
+    "recordings it was fitted to, about 0.1 on others."
 )
 _SIGHTS = note(
     "The evidence is the median over the people in the view. Where it is near 0 or below, the others find people that "
