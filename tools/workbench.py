@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-RESULTS = ROOT / "docs" / "results"
+MADE = ROOT / "build" / "results"
 _PROGRAMS = {
     "stseg": [sys.executable, "-c", "import sys; from stseg.commands.main import main; sys.exit(main())"],
     "python": [sys.executable],
@@ -55,13 +55,14 @@ def command_line(text: str | None) -> argparse.ArgumentParser:
     """A command line with its help, and the folders that most tools work with."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=ROOT / "../shared/data", help="folder of data sets")
-    parser.add_argument("--work", type=Path, default=ROOT / "build/results", help="folder for what is made")
-    parser.add_argument("-o", "--output", type=Path, default=RESULTS, metavar="FOLDER", help="of the tables")
+    parser.add_argument("--work", type=Path, default=MADE, help="folder for what is made")
+    parser.add_argument("-o", "--output", type=Path, default=MADE, metavar="FOLDER", help="of the tables")
     return parser
 
 
 def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
     """Write a table of results."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
 

@@ -79,8 +79,8 @@ VISIT = np.dtype(
      ("entered", "?"), ("left", "?")]
 )  # fmt: skip
 """One row per stay of a track in a zone: frames, seconds; whether the track was seen outside before and after."""
-LASTING_SHARE = 0.05
-"""Standard deviation of a count by errors that last: people missed or made up, and shifted cameras; share of it."""
+SYSTEMATIC_SHARE = 0.05
+"""Standard deviation of a count by systematic errors, people missed or made up and shifted cameras: share of it."""
 AWAY = 5.0
 """Gap of a track from which its person was away, seconds."""
 
@@ -90,7 +90,7 @@ def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -
 
     A track exists with probability 1 / (1 + exp(-score)) of its row, and is inside with that of its place,
     independently of the others; the count's mean is the sum of their products p, its variance that of p (1 - p) and of
-    the square of LASTING_SHARE of the mean.
+    the square of SYSTEMATIC_SHARE of the mean.
     """
     index = np.searchsorted(frames, trajectory["frame"])
     inside = zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))
@@ -100,16 +100,16 @@ def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -
     rows["people"] = np.bincount(index[inside], minlength=len(frames))
     rows["expected"] = np.bincount(index, present, len(frames))
     brief = np.bincount(index, present * (1 - present), len(frames))
-    rows["deviation"] = np.sqrt(brief + (LASTING_SHARE * rows["expected"]) ** 2)
+    rows["deviation"] = np.sqrt(brief + (SYSTEMATIC_SHARE * rows["expected"]) ** 2)
     rows["density"] = rows["people"] / max(zone.area, 1e-9)
     return rows
 
 
-def mean_deviation(counts: Rows, frame_rate: float) -> float:
-    """Standard deviation of a mean of COUNT rows: errors last about a second, those of LASTING_SHARE all along."""
-    lasting, frames = LASTING_SHARE * counts["expected"], max(len(counts), 1)
-    brief = (counts["deviation"] ** 2 - lasting**2).sum() * max(frame_rate, 1.0)
-    return float(np.hypot(np.sqrt(max(brief, 0.0)), lasting.sum())) / frames
+def standard_error(counts: Rows, frame_rate: float) -> float:
+    """Standard error of the mean of a zone's COUNT rows, people: all err alike systematically, else for a second."""
+    systematic, frames = SYSTEMATIC_SHARE * counts["expected"], max(len(counts), 1)
+    brief = (counts["deviation"] ** 2 - systematic**2).sum() * min(max(frame_rate, 1.0), frames)
+    return float(np.hypot(np.sqrt(max(brief, 0.0)), systematic.sum())) / frames
 
 
 def zone_visits(zone: Zone, trajectory: Rows, frame_rate: float, patience: float) -> Rows:
@@ -167,11 +167,8 @@ def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float)
         ground = np.stack([stay["x"], stay["y"]], -1)
         kept: list[tuple[int, float, int]] = []
         for row, share, side in _intersections(line, ground):
-            if (
-                kept
-                and kept[-1][2] != side
-                and line.distance(ground[kept[-1][0] + 1 : row + 1]).max(initial=0.0) <= band
-            ):
+            since = ground[kept[-1][0] + 1 : row + 1] if kept else ground[:0]
+            if kept and kept[-1][2] != side and line.distance(since).max(initial=0.0) <= band:
                 kept.pop()
             else:
                 kept.append((row, share, side))

@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.geometry import Grid
-from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, mean_deviation, zone_counts, zone_visits
+from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, standard_error, zone_counts, zone_visits
 from stseg.measures.motion import flow_field, spacings, track_measures
 
 ZONE = np.dtype(
@@ -78,7 +78,7 @@ def measure_tracks(
     visits = [zone_visits(zone, trajectory, frame_rate, patience) for zone in areas.zones]
     crossings = [line_crossings(line, trajectory, frame_rate, band) for line in areas.lines]
     shapes = zip(areas.zones, people, visits, strict=True)
-    zones = [_zone(z.name, z.area, count, stays, mean_deviation(count, frame_rate)) for z, count, stays in shapes]
+    zones = [_zone(z.name, z.area, count, stays, standard_error(count, frame_rate)) for z, count, stays in shapes]
     minutes = max(len(frames) / frame_rate / 60, 1e-9)
     lines = [
         (line.name, (crossed["to"] == "left").sum(), (crossed["to"] == "right").sum(), len(crossed) / minutes,

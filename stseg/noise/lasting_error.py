@@ -33,13 +33,15 @@ _LEAST_DIFFERENCES = 20
 """Least number of differences over a lag."""
 _PRIOR_DIFFERENCES = 50.0
 """Weight of the prior: differences over each lag."""
-_TIME_SPREAD = 1.0
+_TIME_SPREAD = 1.2
 """Spread of the logarithm of time constants about that of the prior."""
+_SHARE_VARIANCE = 2.9
+"""Variance of the variogram at n differences, in shares of its square over n (of Gaussian errors)."""
 
 
 @dataclass(frozen=True)
 class LastingError:
-    """Errors of some quantities, all float64 (quantity,).
+    """Errors of some quantities, all float64 (quantity,); of one alone, (), without `mean_variance`.
 
     Attributes
     ----------
@@ -133,15 +135,17 @@ def _fitted(variogram: Floats, count: Floats, lags: Ints, prior: LastingError, r
     expected = prior.white[:, None] + prior.lasting[:, None] * of_prior
     measured = (count * variogram + _PRIOR_DIFFERENCES * expected) / (count + _PRIOR_DIFFERENCES)
     shapes = 1.0 - np.exp(-seconds / _TIMES[:, None])
-    # A share of 2 / n of its square is the variance of a mean of n squares.
-    unlike = 2.0 * (np.log(_TIMES / prior.seconds[:, None]) / _TIME_SPREAD) ** 2
+    unlike = _SHARE_VARIANCE * (np.log(_TIMES / prior.seconds[:, None]) / _TIME_SPREAD) ** 2
     weight = (count + _PRIOR_DIFFERENCES) / lags
     found = [_fit(value, weight, shapes, cost) for value, cost in zip(measured, unlike, strict=True)]
     return LastingError(*np.array(found, np.float64).reshape(-1, 3).T)
 
 
 def _fit(measured: Floats, count: Floats, shapes: Floats, cost: Floats) -> tuple[float, float, float]:
-    """a^2, b^2 and tau of least squares, with the cost of each tau; a mean of squares errs in proportion to itself."""
+    """a^2, b^2 and tau of least squares to a variogram (lag,), whose errors are in proportion to itself.
+
+    `shapes` (tau, lag) is 1 - r^m, `cost` (tau,) what each tau costs beside the squared residuals.
+    """
     from scipy.optimize import nnls  # a start that fits nothing is faster without it
 
     weight = np.sqrt(count) / np.maximum(measured, 1e-12)

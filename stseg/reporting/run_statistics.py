@@ -12,7 +12,7 @@ from stseg.arrays import Bytes, Flags, Floats, Ints, Rows
 
 DOUBT_LIMIT = 0.9
 """Probability below which a point is doubtful."""
-LONG_RUN = 600.0
+_LONG_RUN = 600.0
 """Length of a run from which its busiest minutes are shown separately, seconds."""
 _EXCHANGE_RATE, _RATE_NEAR_ENDS, _RATE_OF_ABSENCE = 0.058, 0.044, 0.15
 """Exchanges of a track, by each track that begins or ends near it, and by each second in which it has no row."""
@@ -50,12 +50,13 @@ def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
     return np.array([means.get(int(track), np.nan) for track in tracks["id"]])
 
 
-def exchanges(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> Floats:
+def exchange_chances(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> Floats:
     """Chance that each of `tracks` shows another person for a second or more, float64 (n,), 0..1.
 
-    That is more likely where another track begins or ends near it, away from the border float64 (2, 2) (the lower and
-    the upper corner of the ground, metres), and while nobody was seen; the rates are of perturbed runs of recordings.
+    It grows with each track that begins or ends near it, away from the border float64 (2, 2) (the lower and the upper
+    corner of the ground, metres), and with the time without a row; the rates are of perturbed runs of recordings.
     """
+    place = {track: k for k, track in enumerate(tracks["id"].tolist())}
     rows = trajectory[np.lexsort((trajectory["id"], trajectory["frame"]))]
     rate = _EXCHANGE_RATE + _RATE_OF_ABSENCE * (tracks["last"] - tracks["first"] + 1 - tracks["frames"]) / frame_rate
     for name in ("first", "last"):
@@ -64,7 +65,7 @@ def exchanges(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats)
             ground, end = np.stack([people["x"], people["y"]], -1), people["id"] == track["id"]
             if end.any() and (np.minimum(ground[end] - border[0], border[1] - ground[end]) > _BORDER_WIDTH).all():
                 neighbours = ~end & (np.hypot(*(ground - ground[end][0]).T) < _END_DISTANCE)
-                rate += _RATE_NEAR_ENDS * np.isin(tracks["id"], people["id"][neighbours])
+                rate[[place[track] for track in people["id"][neighbours].tolist() if track in place]] += _RATE_NEAR_ENDS
     return np.asarray(-np.expm1(-rate), float)
 
 
@@ -151,7 +152,9 @@ def people_by_hour(span: Span, trajectory: Rows) -> list[BusyTime]:
 
 
 def busiest_minutes(span: Span, trajectory: Rows, most: int = 3) -> list[BusyTime]:
-    """The minutes with most people, the earlier first where they are equal; in order of time."""
+    """The minutes of a long run with most people, the earlier first where they are equal; in order of time."""
+    if (span.stop - span.first) / span.frame_rate < _LONG_RUN:
+        return []
     minutes = _parts(span, trajectory, _MINUTE)
     busiest = sorted(minutes, key=lambda one: (-one.mean, one.first))[:most]
     return sorted((one for one in busiest if one.mean > 0), key=lambda one: one.first)

@@ -19,7 +19,7 @@ from stseg.reporting.page.embedded import embedded_json, thin_sheets
 from stseg.reporting.page.page import Contents, ViewSummary
 from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, flow_map, heat_map
 from stseg.reporting.pictures.plan import plan_view
-from stseg.reporting.run_statistics import LONG_RUN, Span, busiest_minutes, exchanges, ground_by_views, people_by_hour
+from stseg.reporting.run_statistics import Span, busiest_minutes, exchange_chances, ground_by_views, people_by_hour
 from stseg.tasks.overview import seconds_by_stage
 
 _FLOW = 0.5
@@ -61,7 +61,7 @@ def page_contents(
         span=span,
         trajectory=trajectory,
         tracks=run.tracks,
-        exchanges=exchanges(trajectory, run.tracks, run.frame_rate, np.array([rig.grid.x, rig.grid.y]).T),
+        exchange_chances=exchange_chances(trajectory, run.tracks, run.frame_rate, np.array([rig.grid.x, rig.grid.y]).T),
         events=run.events,
         candidates=len(run.ghosts),
         ghosts=ghosts,
@@ -149,8 +149,6 @@ def _haunt_figures(run: Run, bins: Bins, places: Sequence[DwellPlace]) -> list[F
 
 def _busy_figures(run: Run, span: Span) -> list[Figure]:
     """Small plans of the busiest minutes of a long run."""
-    if (span.stop - span.first) / span.frame_rate < LONG_RUN:
-        return []
     rig, trajectory, figures = run.recording.rig, run.trajectory, []
     for number, minute in enumerate(busiest_minutes(span, trajectory), 1):
         rows_of_minute = trajectory[(trajectory["frame"] >= minute.first) & (trajectory["frame"] < minute.stop)]

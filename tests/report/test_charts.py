@@ -18,7 +18,7 @@ from stseg.reporting.run_statistics import (
     Span,
     busiest_minutes,
     doubtful_stretches,
-    exchanges,
+    exchange_chances,
     ground_by_views,
     mean_certainty,
     people_by_hour,
@@ -85,9 +85,9 @@ def test_exchanges_are_likelier_near_ends_and_after_absence() -> None:
     away = [(frame, 5, 5.0, 4.0) for frame in (*range(10), *range(30, 40))]
     rows = trajectory_of(*walks, *late, *at_border, *away)
     tracks = Tracks(rows).summary()
-    chances = exchanges(rows, tracks, 10.0, np.array([[0.0, -5.0], [10.0, 5.0]]))
+    chances = exchange_chances(rows, tracks, 10.0, np.array([[0.0, -5.0], [10.0, 5.0]]))
     assert chances[1] == chances[2] == chances[3] < chances[0] < chances[4] < 1
-    assert exchanges(rows[:0], tracks[:0], 10.0, np.zeros((2, 2))).shape == (0,)
+    assert exchange_chances(rows[:0], tracks[:0], 10.0, np.zeros((2, 2))).shape == (0,)
 
 
 def test_clock_times() -> None:

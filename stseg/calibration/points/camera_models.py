@@ -1,8 +1,8 @@
 """Cameras as functions of unknowns, and their least-squares fit to points.
 
-A free homography and vertical have eleven unknowns; a pose has six, and the focal length is a seventh where no lens is
-given. Where the points agree with the simpler camera, it extrapolates far better, above all above the ground. Radial
-coefficients of a lens may follow the focal length.
+A free homography and vertical have eleven unknowns and a scale; a pose has six, and the focal length is a seventh where
+no lens is given. Where the points agree with the simpler camera, it extrapolates far better, above all above the
+ground. Radial coefficients of a lens may follow the focal length.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from stseg.geometry.fits import homogeneous
 CLICK_SPREAD = 1.0
 """Least standard deviation of a clicked pixel, pixels."""
 _OUTLIER_LIMIT = 4.0
-"""Outlier threshold, robust standard deviations."""
+"""Outlier threshold, by 1.4826 medians of the distances in the image."""
 _MIN_POINTS = 5
 """Number of points up to which none is rejected."""
 
@@ -104,7 +104,7 @@ class ModelFit:
     used: Flags
     """bool (n,): the points of the fit; outliers are left out."""
     normal: Floats
-    """float64 (k, k): J'J of the reprojection errors in the unknowns, 1 / square pixels."""
+    """float64 (k, k): J'J of the reprojection errors, square pixels over the product of two unknowns' units."""
     squares: float
     """Sum of the squared errors, square pixels."""
 

@@ -12,7 +12,7 @@ MIN_POINTS = 8
 _CHANCE = 0.01
 """Greatest chance that errors of clicks alone give as much support to a coefficient."""
 _LEAST_NOISE = 0.01
-"""Least variance of a pixel, square pixels: no click is more exact."""
+"""Least variance of a pixel in the test, square pixels: points of a simulation would bear out anything."""
 _COEFFICIENTS = 2
 
 

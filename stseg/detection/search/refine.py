@@ -52,7 +52,7 @@ class EvidenceAssignment:
 
 @dataclass(frozen=True)
 class RefinedPlaces:
-    """Marginal posteriors of people's places and heights."""
+    """Marginal posteriors of people's places and heights; of places alone, heights are those given."""
 
     ground: Floats
     """float64 (n, 2): place, marginalised over height, metres."""
@@ -144,7 +144,7 @@ def _posterior(score: Floats, patch: Floats, heights: Floats) -> RefinedPlaces:
 
 
 def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
-    """Means and covariances of places (person, place, 2) by their weights (person, place), metres, square metres."""
+    """Means and covariances of places (person, place, 2) by their weights, with that of the spacing; metres."""
     ground = np.matmul(weight[:, None], patch)[:, 0]
     offset = patch - ground[:, None]
     covariance = np.matmul((offset * weight[..., None]).transpose(0, 2, 1), offset)
@@ -152,7 +152,7 @@ def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
 
 
 def _pillars(view: View, patch: Floats, heights: Floats, width: Floats) -> TriedPillars:
-    """Pillars of all heights (person, height), then of all places of a patch (person, place, 2), for each person."""
+    """Pillars (person, height x place) of heights (person, height) and places (person, place, 2); places are inner."""
     tall = np.repeat(heights, patch.shape[1], 1)
     return view.tried(np.tile(patch, (1, heights.shape[1], 1)), tall, np.repeat(width[:, None], tall.shape[1], 1))
 

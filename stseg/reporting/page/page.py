@@ -45,7 +45,7 @@ class Contents:
     """TRAJECTORY (n,)."""
     tracks: Rows
     """TRACK (m,)."""
-    exchanges: Floats
+    exchange_chances: Floats
     """float64 (m,): chance that each shows another person, 0..1."""
     events: Rows
     """EVENT (k,)."""
@@ -248,7 +248,7 @@ def _track_table(contents: Contents) -> str:
             f"{100 * exchange:.0f}",
         )
         for row, sure, exchange in zip(
-            tracks[:MOST_ROWS], certainty.tolist(), contents.exchanges.tolist(), strict=False
+            tracks[:MOST_ROWS], certainty.tolist(), contents.exchange_chances.tolist(), strict=False
         )
     ]
     names_of_columns = ("track", "first", "last", "frames", "height, m", "a person, %", "exchanged, %")
