@@ -16,6 +16,13 @@ A command turns an `StsegError` into one line on standard error and exit status 
 from __future__ import annotations
 
 
+def printable(text: str) -> str:
+    """A text for the terminal: control characters, and bytes that are no UTF-8, as escapes."""
+    return "".join(
+        character if character.isprintable() else character.encode("unicode_escape").decode() for character in text
+    )
+
+
 class StsegError(Exception):
     """Any error that this package raises on purpose."""
 
@@ -36,7 +43,7 @@ class InputError(StsegError):
     def __init__(self, place: object, key: str, found: object, expected: str) -> None:
         self.place, self.key, self.found, self.expected = str(place), key, str(found), expected
         where = f"{self.place}: {key}" if key else self.place
-        super().__init__(f"{where}: found {self.found}, expected {expected}")
+        super().__init__(printable(" ".join(f"{where}: found {self.found}, expected {expected}".splitlines())))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """So that it comes whole from one process to another."""

@@ -96,8 +96,6 @@ def read_cameras(format: str, files: Sequence[Path], options: ImportOptions) -> 
     for camera in cameras:
         if camera.name and not is_name(camera.name):
             raise FormatError(place, "camera", abbreviated(camera.name), EXPECTED)
-        if not np.isfinite(camera.projection).all():
-            raise CalibrationError(place, f"camera {camera.name}", "numbers that overflow", "those of a camera")
     return cameras
 
 

@@ -15,7 +15,7 @@ from stseg.io.extras import load_extra
 from stseg.io.toml import ANY, parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
-from stseg.io.untrusted.values import parse_whole, printable
+from stseg.io.untrusted.values import parse_whole
 
 _LONGEST_YAML, _DEEPEST_YAML = 1 << 18, 50
 """Characters, and nested brackets: PyYAML needs a time that grows with the square of these."""
@@ -154,7 +154,7 @@ def _table(file: Path, load: Callable[[str], object], language: str) -> ForeignT
     except OSError as error:
         raise FormatError(file, "", error.strerror or error, f"a calibration in {language}") from error
     except Exception as error:  # json, tomllib and yaml have no error in common
-        raise FormatError(file, "", f"what is not {language} ({printable(str(error))[:120]})", language) from error
+        raise FormatError(file, "", f"what is not {language} ({str(error)[:120]})", language) from error
     if not isinstance(top, dict) or not top or not all(isinstance(name, str) for name in top):
         raise FormatError(file, "", "no table of cameras", f"one, in {language}")
     return ForeignTable(file, "", top)

@@ -25,7 +25,7 @@ from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.outputs.whole_files import MARK, write_file
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_xml
-from stseg.io.untrusted.values import parse_numbers, printable
+from stseg.io.untrusted.values import parse_numbers
 
 _MATRIX = ("camera_matrix",)
 _DISTORTION = ("distortion_coefficients",)
@@ -91,7 +91,7 @@ def _numbers(
     words = text.split()
     numbers = parse_numbers(words) if len(words) in counts else None
     if numbers is None:
-        strange = f"{len(words)} numbers: {printable(' '.join(words[:20]))[:60]}"
+        strange = f"{len(words)} numbers: {' '.join(words[:20])[:60]}"
         raise FormatError(file, node.tag, strange, f"{expected}, all finite")
     return file, np.array(numbers)
 
@@ -152,6 +152,6 @@ def _attributes(file: Path, root: ElementTree.Element, tag: str, names: str) -> 
     words = [node.attrib.get(name, "") for name in names.split()]
     numbers = parse_numbers(words)
     if numbers is None:
-        found = f"no finite number: {printable(' '.join(words))[:60]}"
+        found = f"no finite number: {' '.join(words)[:60]}"
         raise FormatError(file, tag, found, f"numbers {names}")
     return numbers

@@ -17,7 +17,6 @@ from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.record import Detections
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.numpy_files import read_npy
 from stseg.io.untrusted.values import parse_number
 
@@ -125,7 +124,6 @@ def _read_lines(path: Path) -> _Lines:
 def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Line number and fields of each line that is not blank."""
     try:
-        require_regular(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             yield from _split(path, file)
     except OSError as error:

@@ -13,7 +13,6 @@ from stseg.io.detections.record import Detections, Request, read_json
 from stseg.io.recording.source_files import numeric_order
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
-from stseg.io.untrusted.values import printable
 
 JSON_FORMATS: tuple[tuple[str, Callable[[Any], bool], Callable[[Request, Any], Detections]], ...] = (
     ("COCO results", json_formats.is_coco_results, json_formats.read_coco_results),
@@ -49,7 +48,7 @@ def _of_form(path: Path, name: str) -> Iterator[None]:
     except OSError as error:
         raise SourceError(path, "", error.strerror or error, "detections") from error
     except (TypeError, LookupError, AttributeError, ValueError, ArithmeticError, RecursionError) as error:
-        found = f"a value of another type or size ({printable(str(error))[:80]})"
+        found = f"a value of another type or size ({str(error)[:80]})"
         raise FormatError(path, "", found, f"{name}, as its format has it") from error
 
 

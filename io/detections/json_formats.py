@@ -12,12 +12,17 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from stseg.arrays import Ints
 from stseg.errors import FormatError, SourceError
 from stseg.io.detections.masks import Mask, flat_polygons, run_lengths
-from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, read_json, required_value
+from stseg.io.detections.record import (
+    DetectionList,
+    Detections,
+    Request,
+    last_numbers,
+    listed_frames,
+    read_json,
+    required_value,
+)
 
 _KEYS = ("xmin", "ymin", "xmax", "ymax")
 
@@ -97,7 +102,7 @@ def _own_number(path: Path, place: str, image: Any) -> int:
     """The frame of a result without an image list: the number that its image id is, or ends with."""
     if isinstance(image, int):
         return image
-    numbers: Ints | None = listed_frames([str(image)])[0] if not str(image).isdigit() else np.array([int(image)])
+    numbers = last_numbers([str(image)])
     if numbers is None:
         raise FormatError(path, place, f"image_id {image!r}", "a number, or `images` in the rig: the image list")
     return int(numbers[0])

@@ -130,12 +130,7 @@ def is_frame_of_results(data: Any) -> bool:
 
 def is_ultralytics_results(data: Any) -> bool:
     """Whether parsed JSON is a list of frames of `Results.to_json`, one of them not empty."""
-    return (
-        isinstance(data, list)
-        and any(data)
-        and all(isinstance(frame, list) for frame in data)
-        and all(map(is_frame_of_results, data))
-    )
+    return isinstance(data, list) and any(data) and all(map(is_frame_of_results, data))
 
 
 def read_ultralytics_results(request: Request, data: Any) -> Detections:

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from stseg.arrays import Rows
+from stseg.errors import printable
 from stseg.io.extras import load_extra
 from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile.reading.run_reader import Run
-from stseg.io.untrusted.values import printable, require_utf8
+from stseg.io.untrusted.values import require_utf8
 
 _TABLES = {
     "recordings": (

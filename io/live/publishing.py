@@ -20,11 +20,10 @@ from typing import Any, Protocol, Self
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from stseg.arrays import Rows
-from stseg.errors import ConfigError
+from stseg.errors import ConfigError, printable
 from stseg.io.extras import load_extra
 from stseg.io.live.live_tables import COLUMNS
 from stseg.io.recording.recording import mask_passwords
-from stseg.io.untrusted.values import printable
 
 _WAITING = 1000
 """Messages that wait for a receiver, one a window."""

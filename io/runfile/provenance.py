@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.errors import SourceError
+from stseg.errors import SourceError, printable
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
@@ -24,7 +24,6 @@ from stseg.io.runfile.reading.hdf5_reading import dataset_text, read_attribute
 from stseg.io.toml import parse_toml
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.safe_hdf5 import read_whole
-from stseg.io.untrusted.values import printable
 from stseg.version import __version__
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")

@@ -26,7 +26,6 @@ from h5py import h5z
 
 from stseg.arrays import AnyArray
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import printable
 
 _FILTERS = frozenset((h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SCALEOFFSET))
 """Filters of HDF5 itself; any other would be loaded as a library from a folder of plug-ins."""
@@ -66,7 +65,7 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
         with hdf5_file(path, "r") as file:
             yield file
     except (RuntimeError, KeyError, TypeError, AttributeError, OverflowError) as error:  # h5py, of broken files
-        raise ValueError(printable(str(error))[:200]) from error
+        raise ValueError(str(error)[:200]) from error
 
 
 @lru_cache(maxsize=64)

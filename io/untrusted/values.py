@@ -72,13 +72,6 @@ def require_utf8(path: Path, purpose: str) -> None:
         raise OutputError(path, "", "a path that is no UTF-8", f"one that is, for {purpose}") from error
 
 
-def printable(text: str) -> str:
-    """A text for the terminal: control characters, and bytes that are no UTF-8, as escapes."""
-    return "".join(
-        character if character.isprintable() else character.encode("unicode_escape").decode() for character in text
-    )
-
-
 def parse_number(text: str) -> float:
     """A finite decimal number from text; nan for anything else.
 

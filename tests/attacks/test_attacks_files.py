@@ -15,7 +15,7 @@ from refusals import REFUSAL_TIME, Command, refused
 from stseg.commands.main import main
 from stseg.errors import FormatError, InputError
 from stseg.io.answers import read_answers, read_names
-from stseg.io.detections.masks import RunLengths, polygons, run_lengths
+from stseg.io.detections.masks import RunLengths, run_lengths
 from stseg.io.detections.record import Detections, last_numbers
 from stseg.io.detections.source_detections import instance_image, read_source
 from stseg.io.outputs.whole_files import NO_INPUTS
@@ -150,18 +150,6 @@ def test_a_name_of_a_million_digits_is_numbered_in_time() -> None:
     assert time.monotonic() - begun < REFUSAL_TIME
 
 
-@pytest.mark.parametrize("points", [[[0.0, 0.0], [1.0, 0.0], [1e308, 1.0]], [[np.nan, 0.0]] * 3])
-def test_outlines_far_beyond_an_image_are_refused(points: list[list[float]]) -> None:
-    refused(ValueError, "far beyond", polygons, [np.array(points)])
-
-
-@pytest.mark.parametrize("segments", [{"x": [1, 5, 10**400], "y": [1, 1, 9]}, {"x": [1e300, 5, 5], "y": [1, 1, 9]}, 7])
-def test_segments_that_are_no_outline_are_refused(tmp_path: Path, segments: object) -> None:
-    box = {"x1": 1, "y1": 2, "x2": 9, "y2": 20}
-    (tmp_path / "r.json").write_text(json.dumps([[{"name": "person", "box": box, "segments": segments}]]))
-    refused(FormatError, "frame 0, detection 0", read_source, Source("instances", tmp_path / "r.json"), SIZE)
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_the_box_of_run_lengths_is_that_of_the_mask(seed: int) -> None:
     mask = np.random.default_rng(seed).random((9, 7)) < (seed + 1) / 40
@@ -198,9 +186,9 @@ def test_a_parquet_file_of_many_rows_or_another_type_is_refused(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["\x1b[31m", "x" * 101, "a\0b", ""])
 def test_names_of_people_are_printable(tmp_path: Path, name: str) -> None:
     (tmp_path / "names.csv").write_text(f"id,name\n1,{name}\n")
-    refused(FormatError, "line 2: found name", read_names, tmp_path / "names.csv")
+    refused(FormatError, "line 2: found name '", read_names, tmp_path / "names.csv")
     (tmp_path / "answers.csv").write_text(f"action,id,name\nname,1,{name}\n")
-    refused(FormatError, "line 2: found name", read_answers, tmp_path / "answers.csv", ("name",))
+    refused(FormatError, "line 2: found name '", read_answers, tmp_path / "answers.csv", ("name",))
 
 
 def test_names_may_be_anything_that_prints(tmp_path: Path) -> None:

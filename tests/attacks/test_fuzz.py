@@ -10,8 +10,9 @@ from fuzz.targets import TARGETS, Target, answer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from stseg.errors import printable
 from stseg.io.toml import parse_toml
-from stseg.io.untrusted.values import abbreviated, is_name, parse_number, parse_whole, printable
+from stseg.io.untrusted.values import abbreviated, is_name, parse_number, parse_whole
 
 FILES = 60
 """Mutated files of each target."""

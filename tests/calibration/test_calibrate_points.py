@@ -281,6 +281,8 @@ class TestCommand:
             ("camera,u,v,x\na,1,2,3\n", FormatError, r"\(no y\)"),
             ("camera,u,v,x,y\na,1,two,3,4\n", FormatError, r"line 2, column v: found 'two'"),
             ("camera,u,v,x,y\na,1,2,3\n", FormatError, r"line 2, column y: found ''"),
+            ("camera,u,v,x,y\na/b,1,2,3,4\n", FormatError, r"line 2, column camera: found 'a/b'"),
+            ("camera,u,v,x,y\n" + "a,1,2,3,4\n" * 20_001, FormatError, r"p.csv: found more than 20000 points"),
             ("camera,u,v,x,y\n,1,2,3,4\n", FormatError, r"line 2, column camera: found nothing"),
             ("camera,u,v,x,y\na,1,2,3,4\n", CalibrationError, r"camera a, lines 2 to 2, points: found 1 on the ground"),
         ],

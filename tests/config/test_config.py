@@ -105,7 +105,7 @@ def test_any_settings_read_back_equal_from_their_text(settings: Outer) -> None:
         ({"inner": {"pair": [1]}}, "inner.pair: found [1], expected a list of 2, each a finite number"),
         ({"inner": {"names": ["a", 2]}}, "inner.names: found ['a', 2], expected a list, each a text"),
         ({"inner": {"limit": "x"}}, "inner.limit: found 'x', expected a whole number"),
-        ({"inner": 3}, "inner: found 3, expected a table"),
+        ({"inner": "x"}, "inner: found 'x', expected a table"),
         ({"count": {"a": 3}}, "count: found a table, expected a whole number"),
         ({"cuont": 3}, "cuont: found an unknown key, expected one of kind, quick, count, inner; did you mean count?"),
         ({"inner": {"zzz": 3}}, "inner.zzz: found an unknown key, expected one of share, pair, names, limit"),

@@ -18,12 +18,12 @@ from refusals import Command
 from run_files import write_small_run
 
 from stseg.commands.main import main
+from stseg.errors import printable
 from stseg.io.outputs.whole_files import create_part, replacing
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.reading.run_reader import read_run
 from stseg.io.runfile.unfinished import part_file
-from stseg.io.untrusted.values import printable
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")
 pytestmark = compiled_only

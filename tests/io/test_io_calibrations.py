@@ -109,24 +109,6 @@ class TestOpencvXml:
         camera = camera_of(read_opencv_xml([intrinsic, extrinsic]), World("mm", "-z"))
         np.testing.assert_array_equal(camera.projection, opencv_camera(whole(), tmp_path).projection)
 
-    @pytest.mark.parametrize(
-        ("old", "new", "complaint"),
-        [
-            ("camera_matrix", "camera", r"camera_matrix: found 0 such nodes, expected one"),
-            ("rotation_vectors", "R", r"rotation_vectors or rvec: found 0 such nodes"),
-            ("</opencv_storage>", "<tvec>1 2 3</tvec></opencv_storage>", r"found 2 such nodes"),
-            ("500.0 0.0", "five 0.0", r"camera_matrix: found 9 numbers: five .* expected 9 numbers"),
-            ("500.0 0.0", "0.0", r"camera_matrix: found 8 numbers"),
-            ("500.0 0.0", "nan 0.0", r"camera_matrix: found 9 numbers: nan .* finite"),
-            ("500.0 0.0", "-500.0 0.0", r"camera_matrix: found \[\[-500.0"),
-            ("-0.107", "-0.107 0 0 0 .1 0 0 0", r"distortion_coefficients: found 12 coefficients, expected at most 8"),
-            ("</opencv_storage>", "", r"found what is not XML"),
-        ],
-    )
-    def test_refuses_and_names_the_node(self, tmp_path: Path, old: str, new: str, complaint: str) -> None:
-        assert old in whole()
-        refused(FormatError, rf"config.xml.*{complaint}", opencv_camera, whole().replace(old, new), tmp_path)
-
     @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
     def test_no_document_type_no_entities(self, tmp_path: Path, encoding: str) -> None:
         bomb = '<!DOCTYPE x [<!ENTITY a "500.0"><!ENTITY b "&a;&a;&a;">]>'

@@ -141,6 +141,7 @@ class TestRefuse:
             ("ground = [[100, 0", "ground = [[nan, 0", ONE + "ground", "nan", "3 rows of 3 numbers"),
             ("[0, 0, 3]]", "[0, 0]]", ONE + "ground", "[[100", "3 rows of 3 numbers"),
             ("ground = [[100, 0, 320], [0, -100, 240], [0, 0, 3]]\n", "", ONE + "ground", "noth", "projection"),
+            ("[[camera]]", "[[camera]]\n" * 256, "camera", "257", "at most 256"),
             ("vertical =", "verticle =", ONE + "verticle", "unknown key", "did you mean vertical?"),
             ("vertical = [-320, -240, -1.0]\n", "", ONE + "vertical", "nothing", "3 numbers"),
             ("projection =", "vertical = [0, 0, 1]\nprojection =", TWO + "projection", "beside", "either"),

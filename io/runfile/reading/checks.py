@@ -16,7 +16,7 @@ from stseg.errors import FormatError
 from stseg.io.runfile import layout
 from stseg.io.runfile.reading.hdf5_reading import read_attribute
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name, printable
+from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name
 
 _RANGES: dict[str, tuple[int, int]] = {
     "frame": (0, limits.FRAMES),
@@ -130,7 +130,7 @@ def require_table(bounds: Bounds, name: str, rows: Rows) -> Rows:
     for column, wrong, expected in _wrong_values(bounds, name, rows):
         if wrong.any():
             value = rows[column][int(np.argmax(wrong.reshape(len(rows), -1).any(axis=1)))]
-            raise FormatError(bounds.path, f"/{name}, {column}", printable(str(value))[: limits.NAME], expected)
+            raise FormatError(bounds.path, f"/{name}, {column}", str(value)[: limits.NAME], expected)
     if name in ("trajectory", "boxes") and _repeated(rows):
         raise FormatError(bounds.path, f"/{name}", "a track twice in a frame", "once, or once a view")
     if name == "known_people" and _repeated(rows):

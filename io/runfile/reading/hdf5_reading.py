@@ -17,7 +17,6 @@ from stseg.arrays import AnyArray
 from stseg.errors import FormatError
 from stseg.io.machine import bounded_growth
 from stseg.io.untrusted.safe_hdf5 import open_hdf5
-from stseg.io.untrusted.values import printable
 
 T = TypeVar("T")
 _GROWTH = 1 << 30
@@ -44,7 +43,7 @@ def format_errors(path: Path, place: str) -> Iterator[None]:
     except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:  # whatever h5py raises on broken files
         if path.is_file() and not h5py.is_hdf5(path):
             raise FormatError(path, "", "something that is not HDF5", "a run file") from error
-        found = f"something that cannot be read ({printable(str(error))[:200]})"
+        found = f"something that cannot be read ({str(error)[:200]})"
         raise FormatError(path, place, found, "a whole run file") from error
 
 

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
-from stseg.errors import FormatError
+from stseg.errors import FormatError, printable
 from stseg.geometry import Grid
 from stseg.io.extras import load_extra
 from stseg.io.recording.recording import Recording
@@ -30,7 +30,7 @@ from stseg.io.runfile.reading.hdf5_reading import dataset_texts, format_errors, 
 from stseg.io.runfile.reading.run_arrays import RunVolume, to_data_frame
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.safe_hdf5 import open_hdf5, read_whole
-from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, parse_whole, printable
+from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, parse_whole
 from stseg.records.cell_reliability import CellCounts, CellReliability, count_cells, doubtful_cells, filled_cells
 
 if TYPE_CHECKING:

@@ -44,7 +44,7 @@ from stseg.io.runfile.unfinished.work_files import (
 )
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import is_regular, parse_json, read_text
-from stseg.io.untrusted.values import abbreviated, printable
+from stseg.io.untrusted.values import abbreviated
 
 _MARK = "stseg-work-folder"
 _STREAMS = "streams.npz"
@@ -291,4 +291,4 @@ def differences(now: dict[str, Any], begun: dict[str, Any], prefix: str = "") ->
 
 
 def _value(value: object) -> str:
-    return printable(value[: limits.NAME]) if isinstance(value, str) else abbreviated(value)
+    return value[: limits.NAME] if isinstance(value, str) else abbreviated(value)
