@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
-from stseg.geometry import Rig
+from stseg.arrays import Floats, Ints
 from stseg.records.sizes import Sizes
 
 
@@ -63,17 +61,3 @@ class Explanation:
     nothing was measured."""
     unfinished: int = 0
     """Candidates of the largest group that was not searched to the end, 0 for none."""
-
-
-def empty_explanation(rig: Rig, evidence: Sequence[ViewEvidence]) -> Explanation:
-    """The explanation of a frame without people: every pixel and every box is unassigned."""
-    none, views = np.zeros(0), len(evidence)
-    people = People(
-        np.zeros((0, 2)), none, none, np.zeros((0, 2, 2)), none, np.zeros((views, 0)), np.zeros((views, 0)), none,
-        np.zeros(0, np.int64), Sizes(none, none, none, none),
-    )  # fmt: skip
-    # One raster pixel for the whole image, unassigned.
-    steps = tuple(max(camera.size) for camera in rig.cameras)
-    owner = tuple(np.full((1, 1), -1, np.int16) for _ in steps)
-    boxes = tuple(np.full(len(view) if isinstance(view, Boxes) else 0, -1, np.int64) for view in evidence)
-    return Explanation(people, people, owner, steps, boxes, np.full(len(steps), np.nan))

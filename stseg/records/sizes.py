@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import BodyConfig, TrackingConfig
+from stseg.config import BodyConfig
 
 _UNMEASURED_SHARE = 0.6
 """Share of the population's variance from which on a frame has not measured a size."""
@@ -49,13 +49,6 @@ class Sizes:
         """These, then others."""
         pairs = ((getattr(self, one.name), getattr(others, one.name)) for one in fields(Sizes))
         return Sizes(*(np.concatenate(pair) for pair in pairs))
-
-    def with_noise(self, noise: TrackingConfig) -> Sizes:
-        """These, with one frame's measurement noise added."""
-        return Sizes(
-            self.height, self.height_variance + noise.height_noise**2,
-            self.width, self.width_variance + noise.width_noise**2,
-        )  # fmt: skip
 
     def measured(self, body: BodyConfig) -> tuple[Floats, Floats]:
         """Heights and widths (n,), metres; nan where these posteriors leave the population's variance as it was."""

@@ -25,14 +25,13 @@ from scenes import (
 )
 
 from stseg.arrays import ViewEvidence
-from stseg.baselines.huang_wang_2012.proposals import Fuse, Proposals, marginal
+from stseg.baselines.huang_wang_2012.proposals import Fuse, Proposals, empty_explanation, marginal
 from stseg.config import ProposalConfig
 from stseg.engine.pipeline import Pipeline, find_candidate_source
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.occupancy.volume import Occupancy
 from stseg.records.candidates import Candidates
-from stseg.records.people import empty_explanation
 
 Asked = Literal["lattice", "probability", "volume", "both"]
 VIEWS = corner_cameras()

@@ -114,12 +114,14 @@ class TestFit:
         assert off(fit(noisy, true).camera, true) < 12
 
     @pytest.mark.parametrize("wrong", range(7))
-    def test_one_wrong_point_is_pointed_out_and_does_no_harm(self, wrong: int) -> None:
+    @pytest.mark.parametrize(("jump", "high"), [((60.0, -45.0), DOOR), ((-400.0, 300.0), None)])
+    def test_one_wrong_point_is_pointed_out_and_does_no_harm(
+        self, wrong: int, jump: tuple[float, float], high: Floats | None
+    ) -> None:
         true = camera()
-        ground = np.concatenate([SPREAD, [[0.5, 1.2], [-1.2, -0.3]]])
-        points = points_of(true, ground)
+        points = points_of(true, np.concatenate([SPREAD, [[0.5, 1.2], [-1.2, -0.3]]]), high)
         pixel = points.pixel + np.random.default_rng(5).normal(0, 0.3, points.pixel.shape)
-        pixel[wrong] += (60.0, -45.0)
+        pixel[wrong] += jump
         found = fit(Points(pixel, points.ground, points.height), true)
         assert np.flatnonzero(found.out).tolist() == [wrong] and found.camera.lens is None
         assert off(found.camera, true) < 6

@@ -53,7 +53,7 @@ class KalmanTracker(FramewiseTracker):
         return PredictedTracks(
             filters.state[:, :2],
             filters.covariance[:, :2, :2] + noise,
-            self.sizes.with_noise(self.config.tracking),
+            self._with_noise(self.sizes),
             DETECTED_LOG_ODDS - EXISTENCE_DECAY * unseen,
         )
 
@@ -84,7 +84,13 @@ class KalmanTracker(FramewiseTracker):
     def _measured(self, sizes: Sizes) -> Sizes:
         """Sizes as measurements: the population prior taken out, the frame's noise added."""
         population = Sizes.of_population(len(sizes.height), self.config.body)
-        return sizes.as_measurements(population).with_noise(self.config.tracking)
+        return self._with_noise(sizes.as_measurements(population))
+
+    def _with_noise(self, sizes: Sizes) -> Sizes:
+        """Sizes, with one frame's measurement noise added."""
+        noise = self.config.tracking
+        height, width = sizes.height_variance + noise.height_noise**2, sizes.width_variance + noise.width_noise**2
+        return Sizes(sizes.height, height, sizes.width, width)
 
     def _assigned(self, filters: Filters, ground: Floats, noise: Floats, sizes: Sizes) -> tuple[Ints, Ints]:
         """Pairs of filters and detections, both int64: the most likely assignment within the gates."""

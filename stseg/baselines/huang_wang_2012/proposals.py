@@ -18,7 +18,8 @@ from stseg.bodies.box_likelihood import box_likelihood
 from stseg.config import Config
 from stseg.geometry import Grid, Rig
 from stseg.records.candidates import Candidates
-from stseg.records.people import Explanation, empty_explanation
+from stseg.records.people import Explanation, People
+from stseg.records.sizes import Sizes
 
 Fuse = Callable[[Sequence[ViewEvidence], Explanation], Singles]
 
@@ -128,3 +129,17 @@ def marginal(volume: Singles) -> Floats:
 def volume_modes(volume: Singles, grid: Grid, kernel: float) -> Modes:
     """Modes of the marginal of a volume of log-odds (plane, y, x): HW12's data-driven candidates."""
     return modes(marginal(volume), grid.ground, grid.cell, kernel)
+
+
+def empty_explanation(rig: Rig, evidence: Sequence[ViewEvidence]) -> Explanation:
+    """The explanation of a frame without people: every pixel and every box is unassigned."""
+    none, views = np.zeros(0), len(evidence)
+    people = People(
+        np.zeros((0, 2)), none, none, np.zeros((0, 2, 2)), none, np.zeros((views, 0)), np.zeros((views, 0)), none,
+        np.zeros(0, np.int64), Sizes(none, none, none, none),
+    )  # fmt: skip
+    # One raster pixel for the whole image, unassigned.
+    steps = tuple(max(camera.size) for camera in rig.cameras)
+    owner = tuple(np.full((1, 1), -1, np.int16) for _ in steps)
+    boxes = tuple(np.full(len(view) if isinstance(view, Boxes) else 0, -1, np.int64) for view in evidence)
+    return Explanation(people, people, owner, steps, boxes, np.full(len(steps), np.nan))

@@ -187,7 +187,10 @@ def require_people(name: str, endpoints: Endpoints) -> None:
     """Raise SourceError where a view shows too few isolated people, or people who do not walk."""
     if len(endpoints) < _MIN_ENDPOINTS:
         found = f"{len(endpoints)} isolated people (a person in a frame counts once)"
-        raise SourceError(name, "", found, f"at least {_MIN_ENDPOINTS}: a longer recording, or one with fewer people")
+        expected = (
+            f"at least {_MIN_ENDPOINTS}: a longer recording, one with fewer people, or --background if it is empty"
+        )
+        raise SourceError(name, "", found, expected)
     foot_spread = float(np.linalg.norm(endpoints.foot.std(axis=0)) / np.median(endpoints.length))
     if foot_spread < _MIN_FOOT_SPREAD:
         found = f"people who stay in one place (their feet move by {foot_spread:.2f} body lengths)"

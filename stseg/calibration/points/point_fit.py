@@ -8,6 +8,7 @@ the ground, or a wall.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -26,7 +27,7 @@ from stseg.calibration.points.camera_models import (
     pose_start,
     project,
 )
-from stseg.calibration.points.point_requirements import require_plane, require_unmirrored
+from stseg.calibration.points.point_requirements import MIN_POINTS, require_plane, require_unmirrored
 from stseg.calibration.points.radial_lens import fit_radial_lens
 from stseg.calibration.points.reference_plane import in_plane_frame, plane_frame
 from stseg.errors import CalibrationError
@@ -45,6 +46,8 @@ VerticalFrom = Literal["points", "lens", "square pixels", "radial lens"]
 """Source of the vertical."""
 _NOISE_RATIO = 1.5
 """Greatest ratio of noise variances, pose to free homography, for the pose to be preferred."""
+_GROSS_ERROR = 4.0
+"""Median error of the direct linear transform from which on some points are taken for wrong, pixels."""
 _DIFFERENCE = 1e-3
 """Step of the finite differences on the ground, metres."""
 
@@ -138,18 +141,37 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     local = Camera.from_projection(name, size, projection, own_lens)
     planes = zip(inner.pixel, inner.height.tolist(), strict=True)
     off_ground = np.hypot(*(np.array([local.back_project(pixel, z) for pixel, z in planes]) - inner.ground).T)
-    return PointFit(camera, points, vertical_from, off, off_ground, outliers(off, fit.used), frame, inner, fit)
+    out = outliers(off, fit.used | inner.low)  # a point that the fit left out counts
+    return PointFit(camera, points, vertical_from, off, off_ground, out, frame, inner, fit)
 
 
 def _free_fit(points: Points, ideal: Floats, lens: Lens | None) -> ModelFit:
     """Homography and, where two points or more determine it, the vertical."""
     high = ~points.low
-    start = fit_homography(points.ground[points.low], ideal[points.low])
+    start = _robust_homography(points.ground[points.low], ideal[points.low])
     unknowns, used = start.ravel(), points.low
     if high.sum() > 1:
         vertical = fit_vertical(start, points.ground[high], points.height[high], ideal[high])
         unknowns, used = np.append(unknowns, vertical), np.ones(len(high), bool)
     return fit_model(free_model(lens), unknowns / np.linalg.norm(start[2]), points, used)
+
+
+def _robust_homography(ground: Floats, pixel: Floats) -> Floats:
+    """The homography of all points, or where these err grossly, without one or two, by the least median of the errors.
+
+    P. Rousseeuw, Least median of squares regression, JASA 79, 1984. One wrong point may turn the plane over.
+    """
+
+    def error(homography: Floats) -> float:
+        image = homogeneous(ground) @ homography.T
+        return float(np.median(np.hypot(*(image[:, :2] / image[:, 2:] - pixel).T)))
+
+    whole, rows = fit_homography(ground, pixel), np.arange(len(ground))
+    if error(whole) < _GROSS_ERROR:
+        return whole
+    left_out = [pair for count in (1, 2) if len(rows) > MIN_POINTS + count for pair in combinations(rows, count)]
+    kept = [np.setdiff1d(rows, pair) for pair in left_out]
+    return min([whole, *(fit_homography(ground[some], pixel[some]) for some in kept)], key=error)
 
 
 def _pose_fit(free: ModelFit, size: tuple[int, int], points: Points, lens: Lens | None) -> ModelFit | None:
