@@ -17,6 +17,14 @@ settings.register_profile("timeless", deadline=None, suppress_health_check=[Heal
 settings.load_profile("timeless")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Each worker takes files that stand together, so that their fixtures are made once; the last are shared out."""
+    from xdist.scheduler import WorkStealingScheduling  # type: ignore[import-untyped]
+
+    return WorkStealingScheduling(config, log)
+
+
 @pytest.fixture(scope="session")
 def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The rig file of a small recording."""

@@ -73,5 +73,15 @@ def commit() -> str:
     return f"{head}+" if _git("status", "--porcelain", "--untracked-files=no", "--", "stseg", "io") else head
 
 
+def checkout(base: str, work: Path) -> Path:
+    """Files of a commit, under the folder of work."""
+    folder = work / "base" / base
+    if not folder.exists():
+        folder.mkdir(parents=True)
+        archive = subprocess.run(["git", "archive", base], cwd=ROOT, stdout=subprocess.PIPE, check=True)
+        subprocess.run(["tar", "-x", "-C", str(folder)], input=archive.stdout, check=True)
+    return folder
+
+
 def _git(*words: str) -> str:
     return subprocess.run(["git", *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()

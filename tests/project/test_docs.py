@@ -175,7 +175,7 @@ def test_every_format_has_a_row() -> None:
 
 def test_ci_runs_the_test_command_of_the_readme() -> None:
     (command,) = re.findall(r"^python3 -m venv .* (-m pytest .*)$", README, re.MULTILINE)
-    assert f'"$bin/python" {command} |' in (ROOT / ".ci" / "run").read_text("utf-8")
+    assert f'"$bin/python" {command} -m' in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
 _CODE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -3,7 +3,7 @@
 import ast
 import sys
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 import pytest
@@ -88,6 +88,7 @@ class Module:
         return names
 
 
+@cache
 def modules() -> list[Module]:
     # The link stseg/io is not followed by glob on every Python, so the folder behind it is read by itself.
     found = {path: ("stseg", *path.relative_to(ROOT / "stseg").parts) for path in (ROOT / "stseg").rglob("*.py")}
@@ -97,9 +98,6 @@ def modules() -> list[Module]:
         Module(".".join(parts).removesuffix(".py").removesuffix(".__init__"), ast.parse(path.read_text("utf-8")))
         for path, parts in sorted(found.items())
     ]
-
-
-MODULES = modules()
 
 
 def parts_imported(module: Module) -> set[str]:
@@ -127,14 +125,14 @@ ALLOWED = {
 """What the modules of a part may import."""
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
-def test_a_module_imports_what_stands_below_it(module: Module) -> None:
-    assert parts_imported(module) <= ALLOWED[module.part]
+def test_a_module_imports_what_stands_below_it() -> None:
+    above = {module.name: parts_imported(module) - ALLOWED[module.part] for module in modules()}
+    assert {name: parts for name, parts in above.items() if parts} == {}
 
 
 @pytest.mark.parametrize("library", AT_HOME)
 def test_a_library_is_known_where_it_belongs(library: str) -> None:
-    at_home = [module for module in MODULES if library in {name.split(".")[0] for name in module.imports}]
+    at_home = [module for module in modules() if library in {name.split(".")[0] for name in module.imports}]
     for module in at_home:
         assert module.name.startswith(AT_HOME[library]), f"{module.name} imports {library}"
     assert at_home, f"nothing imports {library}"
@@ -142,19 +140,21 @@ def test_a_library_is_known_where_it_belongs(library: str) -> None:
 
 def test_every_other_library_is_numpy_scipy_or_of_python_itself() -> None:
     known = {*AT_HOME, *NEEDED, *sys.stdlib_module_names, "stseg"}
-    for module in MODULES:
+    for module in modules():
         assert {name.split(".")[0] for name in module.imports} <= known, module.name
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
-def test_only_commands_print(module: Module) -> None:
-    called = [node.func for node in ast.walk(module.tree) if isinstance(node, ast.Call)]
-    prints = [name for name in called if isinstance(name, ast.Name) and name.id == "print"]
-    assert module.part == "commands" or not prints
+def prints(tree: ast.Module) -> bool:
+    called = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    return any(isinstance(name, ast.Name) and name.id == "print" for name in called)
+
+
+def test_only_commands_print() -> None:
+    assert {module.part for module in modules() if prints(module.tree)} == {"commands"}
 
 
 def test_no_drawer_for_odds_and_ends() -> None:
-    for module in MODULES:
+    for module in modules():
         assert not {"utils", "util", "helpers", "misc", "common"} & set(module.name.split("."))
 
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from result_sets import SETS
-from workbench import ROOT, Bench, command_line
+from workbench import ROOT, Bench, checkout, command_line
 
 _UNCOMPARED = ("timings", "provenance")
 """Parts of a run file in which equal runs differ."""
@@ -104,16 +104,6 @@ def digests(run_file: Path) -> dict[str, str]:
     with h5py.File(run_file) as file:
         file.visititems(add)
     return found
-
-
-def checkout(base: str, work: Path) -> Path:
-    """Files of a commit, under the folder of work."""
-    folder = work / "base" / base
-    if not folder.exists():
-        folder.mkdir(parents=True)
-        archive = subprocess.run(["git", "archive", base], cwd=ROOT, stdout=subprocess.PIPE, check=True)
-        subprocess.run(["tar", "-x", "-C", str(folder)], input=archive.stdout, check=True)
-    return folder
 
 
 def command(folder: Path, words: str, bench: Bench) -> None:
