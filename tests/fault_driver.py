@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,8 @@ SHORT = ("--frames", "0:12", "--set", "segments.length=0.6", "--set", "segments.
 DRIVER = """
 import io, json, os, signal, sys, threading
 from stseg.commands.main import main
-import stseg.commands.run, stseg.engine.track, h5py, cv2
+import stseg.commands.calibrate.app, stseg.commands.correct, stseg.commands.export, stseg.commands.labels
+import stseg.commands.report, stseg.commands.run, stseg.engine.live.following, stseg.engine.track, h5py, cv2
 
 def ours(arguments):
     for one in arguments:
@@ -79,6 +81,7 @@ for line in sys.stdin:
         if after is not None:
             threading.Timer(after, os.kill, (os.getpid(), signal.SIGKILL)).start()
         os.fdopen = fdopen
+        os.environ["STSEG_TRIAL"] = folder
         os.dup2(os.open(log + ".err", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
         os.dup2(2, 1)
         for name in ("open", "fsync", "rename", "replace", "link", "mkdir", "unlink", "rmdir"):
@@ -112,13 +115,15 @@ class Driver:
         (scratch / "warm").mkdir()
         self.run(scratch / "warm" / "run.h5", "warm")
 
-    def run(self, output: Path, fault: str = "none", at: int = -1, after: float | None = None) -> Trial:
-        """A run whose call number `at` fails, or that is killed after some seconds."""
+    def run(
+        self, output: Path, fault: str = "none", at: int = -1, after: float | None = None, words: Sequence[str] = ()
+    ) -> Trial:
+        """A run, or another command, whose call number `at` fails, or that is killed after some seconds."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._log.unlink(missing_ok=True)
         Path(f"{self._log}.err").touch()
-        arguments = ["run", str(self._rig), "-o", str(output), *OPTIONS, *SHORT, *ALONE]
+        arguments = [*(words or ["run", str(self._rig), *OPTIONS, *SHORT, *ALONE]), "-o", str(output)]
         self._process.stdin.write(json.dumps([fault, at, str(output.parent), str(self._log), arguments, after]) + "\n")
         self._process.stdin.flush()
         status = int(self._process.stdout.readline())

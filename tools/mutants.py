@@ -1,203 +1,161 @@
 """Which tests notice that a check of input is gone?
 
-    python tools/mutants.py tests/io tests/config tests/attacks [--every 10] [--most 20]
+    python tools/mutants.py tests/io tests/config tests/attacks [--only io/detections] [--every 10] [--most 5]
 
-A mutant lacks one check of input: a condition that raises is never true, a call that requires or locks is left out, an
-escape returns its text, one part of a question `is_...` is always right, a flag of `open` is not given. Each lives in a
-copy of this process alone, in which tests run that reach its line: those that see it refuse first, then the shortest.
-Tests that start programs of their own see nothing of it, so the share that is noticed is a lower bound.
+A mutant lacks one check: a condition that raises is never true, a call that requires or locks is left out, an escape
+returns its text, one part of a question `is_...` is always right, a flag of `open` is not given. In a copy below build/
+the tests run once while every check is watched, also in the processes that they start: a check that refuses something
+notes the test. Then the checks are broken, one after the other, and the tests of their notes run until one fails.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
-import gc
 import os
 import random
-import signal
+import shutil
+import subprocess
 import sys
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import cache, partial
-from importlib import import_module
-from multiprocessing import Pipe
-from pathlib import Path
-from pkgutil import walk_packages
-from types import CodeType, FrameType, FunctionType
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
-import pytest
 from workbench import ROOT
-
-import stseg
 
 ROOMS = ("io", "stseg/config", "stseg/geometry", "stseg/commands", "stseg/tasks")
 ESCAPES = ("printable", "escape", "abbreviated", "mask_passwords", "quote")
 PREFIXES = ("require", "refuse", "flock", "lockf", "verify", "check")
-Reached = tuple[float, set[str]]
-"""Seconds of a test, and the `PATH:LINE` that it comes to, with a minus before a line that an exception leaves."""
-realpath = cache(os.path.realpath)
+FLAGS = ("O_NOFOLLOW", "O_EXCL", "O_NONBLOCK")
+COPY = ROOT / "build" / "mutants"
+NOTES = COPY / "notes"
+WATCH = f"""
+import os
+def note(check):
+    with open({str(NOTES)!r}, "a") as file:
+        file.write(check + " " + os.environ.get("PYTEST_CURRENT_TEST", "") + chr(10))
+def value(check, found, refusing):
+    if bool(found) == refusing: note(check)
+    return found
+def call(check, work):
+    try: return work()
+    except BaseException: note(check); raise
+def escape(check, work):
+    def watched(text):
+        if (found := work(text)) != str(text): note(check)
+        return found
+    return watched
+"""
 
 
 @dataclass(frozen=True)
-class Mutant:
-    """A module without one of its checks."""
+class Check:
+    """A check: its line, where it stands in the tree, what stands there without it, and the call that watches it."""
 
-    path: str
     line: int
-    end: int
     kind: str
-    code: CodeType = field(repr=False)
+    owner: Any
+    key: Any
+    without: ast.expr
+    watch: str
 
-    def __str__(self) -> str:
-        return f"{os.path.relpath(self.path, ROOT)}:{self.line} | {self.kind}"
-
-    @property
-    def places(self) -> set[str]:
-        """Where it is reached, and where an exception leaves it."""
-        return {f"{self.path}:{self.line}"} | {f"{self.path}:-{line}" for line in range(self.line, self.end + 1)}
-
-    def tests(self, found: Sequence[Reached]) -> list[int]:
-        """The numbers of tests that may notice, in their turn; of a condition only those that see it refuse."""
-        at = f"{self.path}:{self.line}"
-        own = sorted(
-            (len(self.places & places) < 2, seconds, k) for k, (seconds, places) in enumerate(found) if at in places
-        )
-        return [k for unseen, _, k in own if not (unseen and self.kind == "condition")]
+    def replace(self, other: ast.expr) -> Any:
+        """Put something in its place; what stood there."""
+        place = self.owner if isinstance(self.owner, list) else vars(self.owner)
+        old, place[self.key] = place[self.key], other
+        return old
 
 
-def mutants(path: Path) -> Iterator[Mutant]:
-    """All mutants of a module."""
-    tree = ast.parse(path.read_text("utf-8"))
-    for owner, name, at, kind, other in [found for node in ast.walk(tree) for found in _changes(node)]:
-        values = getattr(owner, name)
-        whole = values if at is None else values[at]
-        for one in ast.walk(other):
-            ast.copy_location(one, whole)
-        setattr(owner, name, other if at is None else [*values[:at], other, *values[at + 1 :]])
-        code = compile(tree, str(path), "exec")
-        yield Mutant(str(path.resolve()), whole.lineno, getattr(owner, "end_lineno", whole.lineno), kind, code)
-        setattr(owner, name, values)
+def checks(tree: ast.Module) -> Iterator[Check]:
+    """All checks of a module, in one order always."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.If(body=[*_, ast.Raise()]):
+                yield Check(node.lineno, "condition", node, "test", ast.Constant(False), "value(K, X, 1)")
+            case ast.Expr(value=ast.Call(func=called)) if _name(called).startswith(PREFIXES):
+                yield Check(node.lineno, "call", node, "value", ast.Constant(None), "call(K, lambda: X)")
+            case ast.FunctionDef(name=name) if name.startswith(("is_", "_is_")):
+                for part in ast.walk(node):
+                    if isinstance(part, ast.BoolOp) and isinstance(part.op, ast.And):
+                        for k, one in enumerate(part.values):
+                            yield Check(
+                                one.lineno, "question", part.values, k, ast.Constant(True), "value(K, X, False)"
+                            )
+            case ast.BinOp(op=ast.BitOr(), right=right) if _name(right) in FLAGS:
+                yield Check(node.lineno, "flag", node, "right", ast.Constant(0), "value(K, X, 1)")
+            case ast.Call(func=called, args=[_]) if _name(called) in ESCAPES:
+                yield Check(node.lineno, "escape", node, "func", ast.Name("str"), "escape(K, X)")
 
 
-def _changes(node: ast.AST) -> Iterator[tuple[ast.AST, str, int | None, str, Any]]:
-    """The node, its field, the place within, the kind, and what stands there instead."""
-    match node:
-        case ast.If(body=[*_, ast.Raise()]):
-            yield node, "test", None, "condition", ast.Constant(False)
-        case ast.Expr(value=ast.Call(func=called)) if ast.unparse(called).split(".")[-1].startswith(PREFIXES):
-            yield node, "value", None, "call", ast.Constant(None)
-        case ast.FunctionDef(name=name) if name.startswith(("is_", "_is_")):
-            for part in ast.walk(node):
-                if isinstance(part, ast.BoolOp) and isinstance(part.op, ast.And):
-                    yield from ((part, "values", k, "question", ast.Constant(True)) for k in range(len(part.values)))
-        case ast.BinOp(op=ast.BitOr(), right=right) if ast.unparse(right).endswith(
-            ("O_NOFOLLOW", "O_EXCL", "O_NONBLOCK")
-        ):
-            yield node, "right", None, "flag", ast.Constant(0)
-        case ast.Call(func=called, args=[_]) if ast.unparse(called).split(".")[-1] in ESCAPES:
-            yield node, "func", None, "escape", ast.Name("str", ast.Load())
+def _name(called: ast.AST) -> str:
+    return ast.unparse(called).split(".")[-1]
 
 
-def insert(mutant: Mutant) -> None:
-    """Give all functions of the module the mutant's code."""
-    found, rest = dict[tuple[str, int], CodeType](), [mutant.code]
-    while rest:
-        code = rest.pop()
-        found[code.co_name, code.co_firstlineno] = code
-        rest += [one for one in code.co_consts if isinstance(one, CodeType)]
-    for own in [one for one in gc.get_objects() if type(one) is FunctionType]:
-        if realpath(own.__code__.co_filename) == mutant.path:
-            own.__code__ = found.get((own.__name__, own.__code__.co_firstlineno), own.__code__)
+def watched(place: str, text: str) -> str:
+    """A module's text with all its checks watched."""
+    tree = ast.parse(text)
+    for number, check in reversed(list(enumerate(checks(tree)))):
+        call: Any = ast.parse(f"_watch.{check.watch.replace('K', repr(f'{place}#{number}'))}", mode="eval").body
+        value = check.replace(call)
+        if isinstance(call.args[1], ast.Lambda):
+            call.args[1].body = value
+        else:
+            call.args[1] = value
+    future = sum("__future__" in ast.unparse(one) for one in tree.body)
+    tree.body.insert(future + bool(ast.get_docstring(tree)), ast.parse("from stseg import _watch").body[0])
+    return ast.unparse(ast.fix_missing_locations(tree))
 
 
-def in_copy(work: Callable[[], Any], seconds: float) -> Any:
-    """The answer of a call in a copy of this process; None if it crashes or takes too long."""
-    ours, theirs = Pipe(duplex=False)
-    if (child := os.fork()) == 0:
-        os.setsid()
-        sink = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(sink, 1), os.dup2(sink, 2)
-        try:
-            theirs.send(work())
-        finally:
-            os._exit(0)
-    theirs.close()
-    try:
-        return ours.recv() if ours.poll(seconds) else None
-    except EOFError:
-        return None
-    finally:
-        os.killpg(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+def tests_pass(words: Sequence[str], seconds: float | None = None) -> bool:
+    """Whether tests pass in the copy."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", *words]
+    sink, own = None if seconds is None else subprocess.DEVNULL, os.environ | {"PYTHONPATH": str(COPY)}
+    with suppress(subprocess.TimeoutExpired):
+        return subprocess.run(command, cwd=COPY, env=own, timeout=seconds, stdout=sink, check=False).returncode == 0
+    return False
 
 
-class Round:
-    """The tests that pytest collects, run over mutants in place of once."""
-
-    def __init__(self, given: argparse.Namespace) -> None:
-        self.given, self.failures = given, 0
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self.failures += report.failed
-
-    def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        for module in walk_packages(stseg.__path__, "stseg."):
-            import_module(module.name)
-        every = [one for room in ROOMS for path in sorted((ROOT / room).rglob("*.py")) for one in mutants(path)]
-        chosen = random.Random(1).sample(every, len(every) // self.given.every)
-        places = set[str]().union(*(one.places for one in chosen))
-        found = in_copy(lambda: [self.reached(places, *pair) for pair in followed(session.items)], 1e5)
-        noticed = 0
-        for one in sorted(chosen, key=lambda one: (one.path, one.line)):
-            numbers = one.tests(found)[: self.given.most]
-            work = partial(self.first_failure, one, [session.items[k] for k in numbers])
-            test = in_copy(work, 60 + 3 * sum(found[k][0] for k in numbers))
-            noticed += test != ""
-            print(f"| {one} | {'hangs or crashes' if test is None else test} |", flush=True)
-        print(f"{len(chosen)} of {len(every)} checks were left out; tests noticed {100 * noticed / len(chosen):.1f} %")
-        return True
-
-    def reached(self, places: set[str], item: pytest.Item, following: pytest.Item | None) -> Reached:
-        """Where a test comes to; nowhere if it fails without mutants."""
-        paths, found = {place.rpartition(":")[0] for place in places}, set[str]()
-
-        def line(frame: FrameType, event: str, *_: object) -> Any:
-            found.add(f"{realpath(frame.f_code.co_filename)}:{'-' * (event == 'exception')}{frame.f_lineno}")
-            return line
-
-        def trace(frame: FrameType, *_: object) -> Any:
-            return line if realpath(frame.f_code.co_filename) in paths else None
-
-        before, begun = self.failures, time.monotonic()
-        threading.settrace(trace)
-        sys.settrace(trace)
-        item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-        sys.settrace(None)
-        return time.monotonic() - begun, found & places if self.failures == before else set()
-
-    def first_failure(self, mutant: Mutant, items: list[pytest.Item]) -> str:
-        """The first test that fails; empty if all pass."""
-        insert(mutant)
-        for item, following in followed(items):
-            item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-            if self.failures:
-                return item.nodeid
-        return ""
-
-
-def followed(items: list[pytest.Item]) -> Iterator[tuple[pytest.Item, pytest.Item | None]]:
-    """Each item and the next, which may share its fixtures."""
-    return zip(items, [*items[1:], None], strict=False)
+def main() -> None:
+    """Watch, then break."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", help="beginning of the paths whose checks are broken")
+    parser.add_argument("--every", type=int, default=1, help="one of so many checks, by chance")
+    parser.add_argument("--most", type=int, default=5, help="most functions of tests for a check")
+    given, words = parser.parse_known_args()
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True)
+    names = listed.stdout.splitlines()
+    for name in names:
+        (COPY / name).parent.mkdir(parents=True, exist_ok=True)
+        (COPY / name).unlink(missing_ok=True)
+        shutil.copy2(ROOT / name, COPY / name, follow_symlinks=False)
+    texts = {name: (ROOT / name).read_text() for name in names if name.startswith(ROOMS) and name.endswith(".py")}
+    (COPY / "stseg" / "_watch.py").write_text(WATCH)
+    for name, text in texts.items():
+        (COPY / name).write_text(watched(name, text))
+    NOTES.unlink(missing_ok=True)
+    tests_pass(words)
+    tests = defaultdict[str, Counter[str]](Counter)
+    for noted, _, test in (line.partition(" ") for line in NOTES.read_text().splitlines()):
+        tests[noted][test.partition("[")[0].partition(" (")[0]] += 1
+    for name, text in texts.items():
+        (COPY / name).write_text(text)
+    every = [(name, k) for name, text in texts.items() for k, _ in enumerate(checks(ast.parse(text)))]
+    every = [one for one in every if one[0].startswith(given.only)]
+    chosen, noticed = random.Random(1).sample(every, len(every) // given.every), 0
+    for name, number in sorted(chosen):
+        tree = ast.parse(texts[name])
+        check = list(checks(tree))[number]
+        check.replace(check.without)
+        (COPY / name).write_text(ast.unparse(ast.fix_missing_locations(tree)))
+        seen = [test for test, _ in tests[f"{name}#{number}"].most_common(given.most) if test]
+        is_noticed = bool(seen) and not tests_pass(["-x", *seen], 300)
+        (COPY / name).write_text(texts[name])
+        noticed += is_noticed
+        print(f"| {name}:{check.line} | {check.kind} | {is_noticed} | {' '.join(seen)} |", flush=True)
+    print(f"{len(chosen)} of {len(every)} checks were left out; tests noticed {100 * noticed / len(chosen):.1f} %")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tests", nargs="+", help="files or folders of tests")
-    parser.add_argument("--every", type=int, default=1, help="one of so many checks, by chance")
-    parser.add_argument("--most", type=int, default=20, help="most tests of a mutant")
-    given = parser.parse_args()
-    sys.exit(pytest.main(["-q", "-p", "no:xdist", "-p", "no:cacheprovider", *given.tests], plugins=[Round(given)]))
+    main()

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from stseg.evaluation import evaluate
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.live_tables import CorrectionTable
 from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.io.track_csv import read_tracks_csv
 from stseg.records.tables import CORRECTION, TRAJECTORY
 from stseg.tracking.windows.windows import ENDLESS
@@ -198,6 +200,18 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
     messages = read_tracks_csv(output.with_name("run.h5.live.csv"))
     assert (np.diff(messages["frame"]) >= 0).all()
     assert (evaluate(walkers(FRAMES), messages).switches, len(messages)) == (0, 3 * FRAMES)
+
+
+def test_a_kill_before_its_folder_is_removed_is_mended(
+    rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = (rig, tmp_path / "run.h5", "--follow", "--frames", f"0:{FRAMES}")
+    with monkeypatch.context() as patch:
+        patch.setattr(WorkFolder, "remove", Mock(side_effect=OSError(5, "killed")))
+        assert track(*words) == 2
+    assert track(*words) == 0
+    assert_same(tmp_path / "run.h5", live)
+    assert not (tmp_path / "run.h5.segments").exists()
 
 
 def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

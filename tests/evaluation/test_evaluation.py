@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 import pytest
@@ -345,14 +345,10 @@ def test_the_command_line_is_understood(files: tuple[Path, Path], capsys: pytest
         assert (answer["frames"], answer["MODA"], answer["area"], answer["gate_m"]) == (5, 100, [-1, -1, 9, 9], 0.4)
 
 
-@pytest.mark.parametrize("frames", ["5:2", "5:5", "a:b", "1:2:3", "", "3,", ":", "2:"])
-def test_frames_that_make_no_sense_are_refused(files: tuple[Path, Path], frames: str) -> None:
-    refused(ConfigError, "--frames", command, *files, frames=frames)
-
-
-@pytest.mark.parametrize("area", ["1,2,3", "a,b,c,d", "3,0,1,1", "0,nan,1,1", ""])
-def test_areas_that_make_no_sense_are_refused(files: tuple[Path, Path], area: str) -> None:
-    refused(ConfigError, "--area", command, *files, area=area)
+@pytest.mark.parametrize(("option", "texts"), [("frames", "5:2 5:5 a:b 1:2:3 3, : 2:"), ("area", "1,2,3 a,b 3,0,1,1")])
+def test_options_that_make_no_sense_are_refused(files: tuple[Path, Path], option: str, texts: str) -> None:
+    for text in (*texts.split(), "0,nan,1,1", ""):
+        refused(ConfigError, f"--{option}", cast(Any, command), *files, **{option: text})
 
 
 def test_a_run_file_is_read_as_a_run(

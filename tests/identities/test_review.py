@@ -15,10 +15,10 @@ from stseg.commands.correct import correct
 from stseg.commands.export import export
 from stseg.commands.report import report
 from stseg.commands.review import review
-from stseg.errors import FormatError, InputError
+from stseg.errors import InputError
 from stseg.identities.review.corrections import ACTIONS, Answer, Corrections, solve_corrections
 from stseg.identities.review.doubts import _together, find_doubts
-from stseg.io.answers import read_answers, read_names
+from stseg.io.answers import read_answers
 from stseg.io.runfile.runs import read_run
 from stseg.records.tables import TRACK, TRAJECTORY, Tracks
 from stseg.tasks.review import question_words
@@ -208,27 +208,6 @@ def test_the_command_leaves_the_run_and_its_volume_alone(tmp_path: Path) -> None
     np.testing.assert_array_equal(label, np.array([0, 2, 1])[label_before])
     with h5py.File(tmp_path / "new.h5") as file:
         assert file["provenance/answers"].asstr()[()].startswith("action,frame")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("frame,id\n1,2\n", "header: found frame,id, expected the columns action"),
-        ("action,frame,id\nswitch,1,2\n", "line 2: found action 'switch'"),
-        ("action,frame,id\nsplit,x,2\n", "line 2: found frame 'x', expected a whole number"),
-        ("action,frame,id\nsplit,4,\n", "line 2: found no id"),
-    ],
-)
-def test_malformed_answers_are_one_line(tmp_path: Path, text: str, message: str) -> None:
-    run = write_small_run(tmp_path / "run.h5")
-    (tmp_path / "a.csv").write_text(text)
-    refused(FormatError, message, correct, run, tmp_path / "a.csv", output=tmp_path / "new.h5")
-    assert not (tmp_path / "new.h5").exists()
-
-
-def test_names_are_read_once_each(tmp_path: Path) -> None:
-    (tmp_path / "n.csv").write_text("id,name\n3,Ann\n3,Bo\n")
-    refused(FormatError, "line 3: found id 3 twice", read_names, tmp_path / "n.csv")
 
 
 def test_names_go_through_exports_and_report(tmp_path: Path) -> None:

@@ -1,15 +1,18 @@
 """What readers of detections and calibrations refuse: the place, what was found, what was expected, in one line."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from refusals import refused
 
-from stseg.errors import InputError
+from stseg.errors import FormatError, InputError
+from stseg.io.answers import read_answers, read_names
 from stseg.io.calibrations.formats import ImportOptions, read_cameras
 from stseg.io.detections.source_detections import read_source
 from stseg.io.recording.recording import Source
+from stseg.io.track_csv import read_tracks_csv as tracks
 from stseg.io.untrusted import limits
 
 SIZE = (80, 60)
@@ -148,3 +151,38 @@ def test_calibrations_are_refused(
 @pytest.mark.parametrize(("size", "unit", "missing"), [(None, "m", "--size"), (SIZE, None, "--unit")])
 def test_homographies_of_pom_need_size_and_unit(size: Any, unit: str | None, missing: str) -> None:
     refused(InputError, f"{missing}: found nothing", read_cameras, "pom", [], ImportOptions(size, unit, 1.8))
+
+
+def answers(path: Path) -> object:
+    """Answers of a review to its questions."""
+    return read_answers(path, ("split", "swap"))
+
+
+@pytest.mark.parametrize(
+    ("reader", "text", "message"),
+    [
+        (answers, "frame,id\n1,2\n", "header: found frame,id, expected the columns action"),
+        (answers, "action,frame,id\nswitch,1,2\n", "line 2: found action 'switch'"),
+        (answers, "action,frame,id\nsplit,x,2\n", "line 2: found frame 'x', expected a whole number"),
+        (answers, "action,frame,id\nsplit,4,\n", "line 2: found no id"),
+        (read_names, "id,name\n3,Ann\n3,Bo\n", "line 3: found id 3 twice"),
+        (read_names, "id,name\n,Ann\n", "line 2: found no id"),
+        (tracks, "frame,id,x,y\n0,1,0,0\n1,1,nan,0\n", "line 3, column x: found 'nan', expected a finite number"),
+        (tracks, "frame,id,x,y\n0,1,0,-inf\n", "line 2, column y: found '-inf', expected a finite number"),
+        (tracks, "frame,id,x,y\n0,1,here,0\n", "line 2, column x: found 'here'"),
+        (tracks, "frame,id,x,y\n0,1,,0\n", "line 2, column x: found ''"),
+        (tracks, "frame,id,x,y\n0.5,1,0,0\n", "line 2, column frame: found '0.5', expected a whole number"),
+        (tracks, "frame,id,x,y\n1e300,1,0,0\n", "line 2, column frame: found '1e300', expected a finite number"),
+        (tracks, "frame,id,x,y\n0,,0,0\n", "line 2, column id: found ''"),
+        (tracks, "frame,id,x,y,flag\n0,1,0,0,bad\n", "line 2, column flag: found 'bad'"),
+        (tracks, "frame,id,x,y\n0,1,0,0\n\n1,2,0,0\n0,1,2,2\n", "line 5, column id: found '1' again in the same"),
+        (tracks, "frame,id,x,y\n0,1,0\n", "line 2: found 3 cells, expected 4"),
+        (tracks, "frame,id,x\n0,1,0\n", r"header: found frame,id,x, expected columns frame,id,x,y \(no y\)"),
+        (tracks, "frame;id;x;y\n0;1;0;0\n", "header: found frame;id;x;y"),
+        (tracks, "0,1,0.5,0.5\n", "header: found 0,1,0.5,0.5"),
+        (tracks, "", "header: found nothing"),
+    ],
+)  # fmt: skip
+def test_tables_are_refused(tmp_path: Path, reader: Callable[[Path], object], text: str, message: str) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    assert "\n" not in refused(FormatError, f"t.csv: {message}", reader, tmp_path / "t.csv")

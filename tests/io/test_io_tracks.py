@@ -82,30 +82,6 @@ def test_ids_are_numbers_or_names(path: Path, ids: str, read: list[int]) -> None
     assert read_tracks_csv(path)["id"].tolist() == [*read, read[0]]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("frame,id,x,y\n0,1,0,0\n1,1,nan,0\n", "line 3, column x: found 'nan', expected a finite number"),
-        ("frame,id,x,y\n0,1,0,-inf\n", "line 2, column y: found '-inf', expected a finite number"),
-        ("frame,id,x,y\n0,1,here,0\n", "line 2, column x: found 'here'"),
-        ("frame,id,x,y\n0,1,,0\n", "line 2, column x: found ''"),
-        ("frame,id,x,y\n0.5,1,0,0\n", "line 2, column frame: found '0.5', expected a whole number"),
-        ("frame,id,x,y\n1e300,1,0,0\n", "line 2, column frame: found '1e300', expected a finite number"),
-        ("frame,id,x,y\n0,,0,0\n", "line 2, column id: found ''"),
-        ("frame,id,x,y,flag\n0,1,0,0,bad\n", "line 2, column flag: found 'bad'"),
-        ("frame,id,x,y\n0,1,0,0\n\n1,2,0,0\n0,1,2,2\n", "line 5, column id: found '1' again in the same frame"),
-        ("frame,id,x,y\n0,1,0\n", "line 2: found 3 cells, expected 4"),
-        ("frame,id,x\n0,1,0\n", r"header: found frame,id,x, expected columns frame,id,x,y \(no y\)"),
-        ("frame;id;x;y\n0;1;0;0\n", "header: found frame;id;x;y"),
-        ("0,1,0.5,0.5\n", "header: found 0,1,0.5,0.5"),
-        ("", "header: found nothing"),
-    ],
-)
-def test_what_is_wrong_is_named_with_its_place(path: Path, text: str, message: str) -> None:
-    path.write_text(text)
-    refused(FormatError, f"tracks.csv: {message}", read_tracks_csv, path)
-
-
 def test_files_that_cannot_be_read_or_written_are_named(path: Path) -> None:
     path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
     refused(FormatError, "not text", read_tracks_csv, path)

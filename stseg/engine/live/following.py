@@ -108,7 +108,10 @@ def follow_recording(
         require_output(live_corrections_of(output), overwrite, inputs, ",".join(COLUMNS))
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         try:
-            followed = _follow(job, folder, output, overwrite, reporter, publish)
+            done = folder.published  # a kill came before the folder was removed
+            followed = (
+                Followed(read_run(output), "") if done else _follow(job, folder, output, overwrite, reporter, publish)
+            )
         except BaseException:
             if not folder.segments():  # nothing to resume
                 table.unlink(missing_ok=True)
