@@ -8,12 +8,15 @@ from hypothesis import HealthCheck, settings
 from recordings import track, write_recording
 from refusals import REFUSAL_TIME, Command
 from run_files import write_small_run
+from strategies import examples
 
 from stseg.commands.main import main
 
 # Examples take as long as they take on a machine that others use, too: only a whole test may be too slow. Folders of a
 # test may be those of all its examples, each of which writes its files anew.
-settings.register_profile("timeless", deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+settings.register_profile(
+    "timeless", max_examples=examples(100), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 settings.load_profile("timeless")
 
 

@@ -12,6 +12,7 @@ from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.lens import LensModel
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, Recording, Source
 from stseg.io.untrusted.values import is_name
+from stseg.kernels.accelerate import COMPILED
 
 BARREL = (-0.39, 0.25, 0.0008, -0.0017, -0.107)
 """A strong barrel, whose polynomial turns round about 48 degrees off the axis."""
@@ -25,6 +26,11 @@ LENSES: tuple[tuple[tuple[float, ...], LensModel], ...] = (
     (FISHEYE, "fisheye"),
 )
 """Coefficients and models of lenses of all kinds."""
+
+
+def examples(number: int) -> int:
+    """Number of examples of a property: all of them where kernels are compiled, a fifth where they are plain Python."""
+    return number if COMPILED else -(-number // 5)
 
 
 @dataclass(frozen=True)

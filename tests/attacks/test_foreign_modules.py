@@ -1,5 +1,6 @@
 """Modules of standard names beside a recording: no process of any command, nor of `stseg.track`, runs them."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 from arrivals import arrive, write_pieces
 from cluster import started_cluster
-from recordings import ENVIRONMENT, OPTIONS, compiled_only, write_recording
+from recordings import ENVIRONMENT, OPTIONS, compiled_only
 
 LIBRARIES = ("numpy", "scipy", "h5py", "cv2", "numba", "cyclopts", "rich", "PIL", "maxflow", "yaml", "duckdb", "stseg")
 SCRIPT = "from stseg.commands.main import command\nif __name__ == '__main__':\n    command()\n"
@@ -20,11 +21,9 @@ if __name__ == "__main__":
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, rig_path: Path) -> Path:
     """A recording between modules of all names that Python knows; each notes that it ran."""
-    folder = tmp_path / "recording"
-    folder.mkdir()
-    write_recording(folder)
+    folder = shutil.copytree(rig_path.parent, tmp_path / "recording")
     (folder / "short.toml").write_text("[segments]\nlength = 1\nwarm_up = 1\n[detection]\nlattice_spacing = 0.25\n")
     plant(folder)
     return folder

@@ -14,8 +14,8 @@ from stseg.errors import printable
 from stseg.io.toml import parse_toml
 from stseg.io.untrusted.values import abbreviated, is_name, parse_number, parse_whole
 
-FILES = 60
-"""Mutated files of each target."""
+SEEDS = [(1_000_000, 20), pytest.param((1_000_020, 40), marks=pytest.mark.slow)]
+"""First seed and number of mutated files of each target."""
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
@@ -26,9 +26,10 @@ def test_the_valid_file_is_read(tmp_path: Path, target: Target) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")
+@pytest.mark.parametrize("seeds", SEEDS)
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
-def test_mutated_files_are_answered(target: Target) -> None:
-    _, failures = fuzz(target, 1_000_000, time.monotonic() + 20, FILES)
+def test_mutated_files_are_answered(target: Target, seeds: tuple[int, int]) -> None:
+    _, failures = fuzz(target, seeds[0], time.monotonic() + 20, seeds[1])
     assert not failures
 
 

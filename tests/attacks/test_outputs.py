@@ -1,6 +1,7 @@
 """Outputs replace neither inputs nor what stseg did not make: every command, with each of its files as its output."""
 
 import os
+import shutil
 import sys
 from pathlib import Path
 from unittest.mock import Mock
@@ -8,7 +9,6 @@ from unittest.mock import Mock
 import cv2
 import numpy as np
 import pytest
-from recordings import write_recording
 from refusals import Command
 from run_files import write_small_run
 
@@ -47,9 +47,9 @@ def run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def folder(run_folder: Path) -> Path:
+def folder(run_folder: Path, rig_path: Path) -> Path:
     """Inputs of all commands."""
-    write_recording(run_folder)
+    shutil.copytree(rig_path.parent, run_folder, dirs_exist_ok=True)
     write_small_run(run_folder / "more.h5")
     Path("truth.csv").write_text("frame,id,x,y\n11,1,0.2,0.2\n")
     Path("names.csv").write_text("id,name\n1,Ada\n")

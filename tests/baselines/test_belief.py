@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import CONFIG, FRAME_RATE, SIZE, people
 from scipy.stats import multivariate_normal
-from strategies import cameras
+from strategies import cameras, examples
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation
 from stseg.baselines.du_piater_2006.exclusion import exclusion
@@ -26,11 +26,10 @@ from stseg.baselines.du_piater_2006.view import StarView
 from stseg.config import BeliefConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.kernels.accelerate import python_form
+from stseg.kernels.accelerate import COMPILED
 from stseg.trackers import FrameObservations, find_tracker
 
 VIEWS = [StarView.of(camera, RIG.grid) for camera in RIG.cameras]
-INTERPRETED = python_form(fill_origin) is fill_origin
 MOTION = Motion(1 / FRAME_RATE, 0.5, 0.8)
 FEW = BeliefConfig(particles=30)
 
@@ -52,7 +51,7 @@ def spots(data: st.DataObject, n: int) -> Floats:
     return np.array(data.draw(st.lists(st.tuples(*[st.floats(-2, 2)] * 2), min_size=n, max_size=n)))
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(st.data())
 def test_a_prediction_is_a_mixture(data: st.DataObject) -> None:
     n, k = data.draw(st.integers(1, 5)), data.draw(st.integers(1, 4))
@@ -101,7 +100,7 @@ def test_drawn_as_often_as_the_weight_says(weight: list[float], lot: float) -> N
     assert np.abs(often - 40 * share).max() < 1 + 1e-6
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(cameras(lenses=False), st.floats(-1, 1), st.floats(-1, 1))
 def test_the_jacobians_are_slopes_of_the_homography(camera: Camera, x: float, y: float) -> None:
     view, ground = StarView.of(camera, RIG.grid), np.array([[x, y]])
@@ -129,7 +128,7 @@ def test_bins_of_colours() -> None:
         assert HSV_BINS[tuple(4 * c for c in colour)] in nearly | {plain.hsv_bin((blue, green, red))}
 
 
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(st.data())
 def test_histograms(data: st.DataObject) -> None:
     image = np.random.default_rng(data.draw(st.integers(0, 99))).integers(0, 256, (40, 50, 3)).astype(np.uint8)
@@ -174,7 +173,7 @@ def test_who_stands_in_front() -> None:
     assert [len(b) for b in boxes] == [1, 0, 0]
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(st.data(), st.sampled_from(([0.1, 0.3, 0.0, 0.2], [0.0] * 4)))
 def test_messages_are_sums_over_the_potential(data: st.DataObject, likelihood: list[float]) -> None:
     ground, mapped = spots(data, 3), spots(data, 4)
@@ -190,7 +189,7 @@ def test_messages_are_sums_over_the_potential(data: st.DataObject, likelihood: l
     np.testing.assert_allclose(potential.to_view(weight), weight @ psi)
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(st.data())
 def test_targets_exclude_each_other(data: st.DataObject) -> None:
     ground, weight = spots(data, 3), np.array([0.2, 0.5, 0.3])
@@ -241,7 +240,7 @@ PASSING = ((-0.9, -0.3, 0.1, 0.0), (0.9, 0.3, -0.1, 0.0))
 
 
 def test_two_who_pass_each_other_keep_their_numbers() -> None:
-    frames = 8 if INTERPRETED else 18
+    frames = 18 if COMPILED else 8
     rows = rows_of(follow(BeliefTracker(RIG, QUICK, 0), frames, PASSING))
     assert len(rows) == 2 * frames
     for who, (x, y, dx, _) in enumerate(PASSING, start=1):
@@ -306,7 +305,7 @@ def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
     for way in ("messages", "condensation"):
         config = replace(FEW, method=way)
         tracker = BeliefTracker(RIG, replace(CONFIG, belief=config), 0)
-        for frame in range(5 if INTERPRETED else 10):
+        for frame in range(10 if COMPILED else 5):
             standing = people((-0.8 + 0.12 * frame, 0.2))
             observations = observations_of(standing)
             views: list[Observation] = list(observations.observations)

@@ -9,7 +9,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from refusals import refused
 from scenes import corner_cameras, likelihoods, looking, people, rig_of
-from strategies import BARREL, cameras, numbers
+from strategies import BARREL, cameras, examples, numbers
 
 from stseg.arrays import Floats, Singles
 from stseg.baselines.huang_wang_2012.detection_probability import DetectionProbability, fill_chance
@@ -59,7 +59,7 @@ def strips(draw: st.DrawFn) -> Pillars:
     return Pillars(upright, one, two, three, base)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(maps(), strips(), numbers(0.01, 0.5))
 def test_the_kernel_is_the_definition(likelihood: Singles, pillars: Pillars, outside: float) -> None:
     rng, widths = np.random.default_rng(0), np.array([0.2, 0.3, 0.4])
@@ -117,7 +117,7 @@ def test_strips_cover_what_the_pillar_does(view: str) -> None:
     assert np.mean(shares) > np.mean([overlap(boxed(image), image) for image in one_box])
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(cameras(lenses=False))
 def test_a_pillar_stands_where_the_homographies_say(camera: Camera) -> None:
     # On the axis, at each end of the strips above the caps, whatever the camera.
@@ -216,7 +216,7 @@ def lattices(draw: st.DrawFn) -> Floats:
     return np.asarray(np.where(rng.random((rows, columns)) < 0.5, rng.random((rows, columns)) ** 3, 0.0))
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(lattices(), numbers(0.6, 3.0))
 def test_samples_move_as_the_formula_says(weight: Floats, reach: float) -> None:
     found, mode = np.empty((np.count_nonzero(weight), 2)), np.empty(np.count_nonzero(weight), np.int64)
@@ -227,7 +227,7 @@ def test_samples_move_as_the_formula_says(weight: Floats, reach: float) -> None:
     np.testing.assert_array_equal(mode, own)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(lattices(), numbers(0.2, 1.0))
 @example(np.zeros((4, 5)), 0.4)
 def test_modes_share_all_samples_out(weight: Floats, kernel: float) -> None:

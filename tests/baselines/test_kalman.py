@@ -8,6 +8,7 @@ import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import CONFIG, FRAME_RATE, found, people, room
+from strategies import examples
 
 from stseg.arrays import Floats, Rows
 from stseg.baselines.huang_wang_2012.kalman import KalmanTracker
@@ -49,7 +50,7 @@ def plain(places: Floats, noise: float, seconds: float, config: MotionConfig) ->
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.floats(0.02, 0.5))
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 def test_filters_side_by_side_are_each_a_plain_one(seed: int, length: int, seconds: float) -> None:
     config, noise = MotionConfig(), 0.03
     paths = np.random.default_rng(seed).normal(0.0, 1.0, (3, length, 2))

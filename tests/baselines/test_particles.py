@@ -9,6 +9,7 @@ from coloured_people import RIG, SHIRTS, follow, frame_of, observations_of, pain
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import CONFIG, SIZE, corner_cameras, looking, mask, people
+from strategies import examples
 
 from stseg.arrays import Boxes, Floats, Observation, Rows, Singles
 from stseg.baselines.colour_views import colour_views
@@ -25,11 +26,10 @@ from stseg.baselines.kim_davis_2006.views import ParticleView
 from stseg.config import Config, ParticleConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.kernels.accelerate import python_form
+from stseg.kernels.accelerate import COMPILED
 from stseg.trackers import FrameObservations
 
 CAMERA = corner_cameras()[0]
-INTERPRETED = python_form(segment) is segment
 
 
 def bodies_of(camera: Camera, standing: Floats) -> Floats:
@@ -61,7 +61,7 @@ def test_normalised_colours_forget_the_light() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 def test_density_is_equation_1(seed: int) -> None:
     rng = np.random.default_rng(seed)
     colour = rng.integers(90, 130, (3, 4, 3), np.uint8)
@@ -85,7 +85,7 @@ def test_histograms_share_out_their_samples() -> None:
 
 
 @given(GROUPS)
-@settings(max_examples=5 if not INTERPRETED else 2)
+@settings(max_examples=examples(5))
 def test_segmentation_is_equations_2_to_4(standing: Floats) -> None:
     ideal, rng = raster(CAMERA), np.random.default_rng(3)
     shape = ideal.shape[:2]
@@ -138,7 +138,7 @@ def test_what_is_open_is_in_front() -> None:
 
 
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=25))
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 def test_the_middle_of_the_shortest_half_is_the_least_median(distances: list[float]) -> None:
     array = np.array(distances)
     middle = _middle_of_shortest_half(array.copy())
@@ -166,7 +166,7 @@ def test_the_axis_of_a_whole_body_passes_through_its_place(median: bool) -> None
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0, np.pi, (views, 2))
@@ -180,7 +180,7 @@ def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
 
 
 @given(GROUPS)
-@settings(max_examples=6 if not INTERPRETED else 1)
+@settings(max_examples=examples(6))
 def test_misfit_is_equations_6_and_7(standing: Floats) -> None:
     ideal, rng = raster(CAMERA, 8), np.random.default_rng(5)
     shape, bodies = ideal.shape[:2], bodies_of(CAMERA, standing)
@@ -235,7 +235,7 @@ def passing(config: Config, frames: int) -> Rows:
 
 
 QUICK = replace(CONFIG, particles=ParticleConfig(particles=6, raster_columns=64, patience=10.0))
-FRAMES = 6 if INTERPRETED else 16
+FRAMES = 16 if COMPILED else 6
 
 
 def test_people_are_followed_by_their_colours() -> None:

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, found, likelihoods, looking, people, rig_of
 from scipy.special import logit
+from strategies import examples
 
 from stseg.arrays import Floats, Singles
 from stseg.baselines.khan_shah_2009.synergy_map import Localiser, fill_means, synergy_terms
@@ -32,7 +33,7 @@ def noise(seed: int, views: int = 4) -> list[Singles]:
     return list((np.rint(level) / TOP_LEVEL).astype(np.float32))
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.integers(1, 30), st.integers(1, 30), st.integers(0, 999))
 def test_means_over_footprints_by_definition(width: int, height: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import body_box, looking, people, ring
-from strategies import numbers
+from strategies import examples, numbers
 
 from stseg.arrays import Floats
 from stseg.bodies.outlines import outlines
@@ -28,7 +28,7 @@ TABLES = {name: BodyTable.of(camera, GRID) for name, camera in VIEWS.items()}
 
 
 @pytest.mark.parametrize("view", VIEWS)
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(1.3, 2.0))
 def test_a_box_is_that_of_the_bodys_points(view: str, x: float, y: float, height: float) -> None:
     expected = body_box(VIEWS[view], np.array([x, y, height]))

@@ -212,6 +212,7 @@ def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: SolvedView
         )
 
 
+@pytest.mark.slow
 def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: SolvedViews) -> None:
     wrong = solution.delay + np.array([0, 0, 1])
     again = refine_cameras(scene.views, solution.adjustment.parameters.views.copy(), wrong, lambda: None)

@@ -224,6 +224,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
     return Demo(folder, printed.getvalue())
 
 
+@pytest.mark.slow
 def test_people_are_tracked(demo: Demo, stdout: Command) -> None:
     truth = demo.folder / "scene" / "truth.csv"
     scores = json.loads(stdout("evaluate", demo.folder / "run.h5", truth, "--json"))
@@ -233,6 +234,7 @@ def test_people_are_tracked(demo: Demo, stdout: Command) -> None:
     assert all(source.source.kind == "video" and source.background for source in run.recording.sources)
 
 
+@pytest.mark.slow
 def test_pictures_and_page_are_there(demo: Demo) -> None:
     cameras = read_run(demo.folder / "run.h5").cameras
     for name in ("plan", "spacetime", "slices", "marginal", *(f"overlay_{camera}" for camera in cameras)):
@@ -240,6 +242,7 @@ def test_pictures_and_page_are_there(demo: Demo) -> None:
     assert (demo.folder / "report.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
 
 
+@pytest.mark.slow
 def test_it_scores_and_names_what_to_open(demo: Demo) -> None:
     assert re.search(r"MODA \d+\.\d %", demo.said)
     listed = re.findall(r"^  (\S+) ", demo.said.partition("\nOpen\n")[2], re.MULTILINE)
@@ -255,6 +258,7 @@ def test_a_folder_with_files_in_it_is_left_alone(tmp_path: Path, refusal: Comman
     assert (tmp_path / "mine.txt").read_text() == "precious"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["chromatic", "codebook"])
 def test_every_background_model_can_be_asked_for(demo: Demo, tmp_path: Path, model: str) -> None:
     rig, output = demo.folder / "scene" / "rig.toml", tmp_path / "run.h5"

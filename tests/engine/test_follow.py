@@ -141,7 +141,7 @@ def test_the_run_file_keeps_every_line_of_the_live_table(live: Path) -> None:
         np.testing.assert_allclose(written[name], kept[name], atol=6e-4, rtol=0)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2)

@@ -1,4 +1,4 @@
-"""Machines that are not as usual: no locks, little memory, a home that cannot be written, other users, odd clocks."""
+"""Machines that are not as usual: no locks, little memory, a home that cannot be written, other users."""
 
 import errno
 import json
@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import pytest
 from attacks import write_rig
-from recordings import COMMAND, OPTIONS, assert_same, compiled_only, process, run_words, started, track, write_recording
+from recordings import COMMAND, OPTIONS, assert_same, compiled_only, process, track, write_recording
 from refusals import Command
 from run_files import write_small_run
 
@@ -27,7 +27,6 @@ from stseg.io.runfile.unfinished import part_file
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")
 pytestmark = compiled_only
-YEAR = 3e7
 AS_NOBODY = """
 import codecs, json, os, sys
 import stseg.commands.export, stseg.commands.inspect
@@ -155,17 +154,3 @@ def test_parts_of_a_later_clock_are_removed(tmp_path: Path) -> None:
     with replacing(tmp_path / "t.csv", overwrite=False) as written:
         written.write_text("new")
     assert [part.exists() for part in parts] == [False, True, False]
-
-
-def test_a_clock_set_back_before_a_resume_changes_nothing(rig_path: Path, undisturbed: Path, tmp_path: Path) -> None:
-    night = tmp_path / "night.h5"
-    with started(COMMAND, *run_words(rig_path, night)) as running:
-        while running.poll() is None and not list(tmp_path.glob("night.h5.segments/segment-*-*.h5")):
-            time.sleep(0.01)
-        running.kill()
-    assert not night.exists()
-    for path in tmp_path.glob("night.h5.segments/*"):
-        os.utime(path, (time.time() + YEAR,) * 2)
-    assert track(rig_path, night) == 0
-    assert_same(night, undisturbed)
-    assert not list(tmp_path.glob("night.h5.*"))

@@ -27,9 +27,7 @@ from stseg.io.recording.frames import FrameSet
 from stseg.kernels.accelerate import COMPILED
 from stseg.records.tables import CANDIDATE, RATES, TIMING, Tracks
 
-INTERPRETED = not COMPILED
-"""Without its compiler the recording must be shorter: a frame takes a hundred times as long."""
-FRAMES, MASKED, BLIND = (12, 7, 7) if INTERPRETED else (40, 17, 17)
+FRAMES, MASKED, BLIND = (40, 17, 17) if COMPILED else (12, 7, 7)
 RIG = room()
 TRUTH = walkers(40)
 FRAME_SETS = {"pixels": mask_frame_sets, "boxes": box_frame_sets}

@@ -98,7 +98,9 @@ print(kills)
     assert [path.name for path in night.parent.iterdir()] == [night.name]
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
+)
 def test_a_signal_ends_a_run_cleanly(
     rig_path: Path, undisturbed: Path, night: Path, number: signal.Signals, status: int
 ) -> None:
@@ -145,6 +147,14 @@ def test_a_flipped_byte_is_noticed_and_its_segment_made_anew(
     assert second.name in messages
     assert first.name not in messages
     assert_same(halfway, undisturbed)
+
+
+def test_a_clock_set_back_before_a_resume_changes_nothing(rig_path: Path, undisturbed: Path, halfway: Path) -> None:
+    for path in segments_of(halfway)[0].parent.iterdir():
+        os.utime(path, (time.time() + 3e7,) * 2)
+    assert track(rig_path, halfway) == 0
+    assert_same(halfway, undisturbed)
+    assert not list(halfway.parent.glob("night.h5.*"))
 
 
 def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, halfway: Path) -> None:

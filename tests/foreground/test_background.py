@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from reference_foreground import FLOOR, SHIRT, near_modes, noisy
 from refusals import refused
+from strategies import examples
 
 from stseg.arrays import Bytes
 from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
@@ -23,7 +24,6 @@ from stseg.foreground.background.codebook import forget_rare_words
 from stseg.foreground.background.codebook_kernels import Codewords
 from stseg.foreground.background.model import Background
 from stseg.foreground.background.posterior import Priors
-from stseg.kernels.accelerate import python_form
 
 SIZE = (7, 6)
 MIDDLE = (3, 3)  # (v, u) of somebody who covers the pixels 2..4 x 2..4
@@ -324,7 +324,7 @@ def assert_same_book(found: reference.Book, expected: reference.Book) -> None:
     np.testing.assert_allclose(one[:, 3:], other[:, 3:], rtol=1e-3)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 10**6), words=st.integers(1, 3))
 def test_the_codebooks_log_odds_are_their_formula(seed: int, words: int) -> None:
     rng = np.random.default_rng(seed)
@@ -333,28 +333,26 @@ def test_the_codebooks_log_odds_are_their_formula(seed: int, words: int) -> None
     expected = reference.codebook_log_odds(image, gain, book.mean, book.bounds, book.weight, config)
     tube = codebook_kernels.Tube(config.highlight_prior, config.brightest_highlight, config.channel_sd)
     log_odds = np.empty(image.shape[:2], np.float32)
-    for function in (codebook_kernels.fill_codebook_log_odds, python_form(codebook_kernels.fill_codebook_log_odds)):
-        function(image, gain.astype(np.float32), book, Priors.of(config), tube, log_odds)
-        np.testing.assert_allclose(log_odds, expected, atol=5e-3)
+    codebook_kernels.fill_codebook_log_odds(image, gain.astype(np.float32), book, Priors.of(config), tube, log_odds)
+    np.testing.assert_allclose(log_odds, expected, atol=5e-3)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 10**6), words=st.integers(1, 3))
 def test_codewords_of_the_empty_scene_are_learned_by_their_rules(seed: int, words: int) -> None:
     rng = np.random.default_rng(seed)
     state = random_book(rng, words)
     longest = rng.integers(0, 20, state[2].shape).astype(np.int32)
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
-    for function in (codebook_kernels.teach, python_form(codebook_kernels.teach)):
-        found, runs = deepcopy(state), longest.copy()
-        function(image, gain, NOW, np.float32(15), runs, found)
-        for v, u in np.ndindex(image.shape[:2]):
-            book = book_of(state, longest, v, u)
-            reference.teach(book, image[v, u].astype(float), gain.astype(float), NOW, 15)
-            assert_same_book(book_of(found, runs, v, u), book)
+    found, runs = deepcopy(state), longest.copy()
+    codebook_kernels.teach(image, gain, NOW, np.float32(15), runs, found)
+    for v, u in np.ndindex(image.shape[:2]):
+        book = book_of(state, longest, v, u)
+        reference.teach(book, image[v, u].astype(float), gain.astype(float), NOW, 15)
+        assert_same_book(book_of(found, runs, v, u), book)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 10**6), words=st.integers(1, 3))
 def test_codewords_follow_the_scene_by_their_rules(seed: int, words: int) -> None:
     rng = np.random.default_rng(seed)
@@ -362,14 +360,13 @@ def test_codewords_follow_the_scene_by_their_rules(seed: int, words: int) -> Non
     none = np.zeros(state[2].shape, np.int32)
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
     likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
-    for function in (codebook_kernels.follow, python_form(codebook_kernels.follow)):
-        found = deepcopy(state)
-        function(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), (30, 12), found)
-        for v, u in np.ndindex(image.shape[:2]):
-            book = book_of(state, none, v, u)
-            x, chance = image[v, u].astype(float), float(likelihood[v, u])
-            reference.follow(book, x, gain.astype(float), chance, NOW, 15, 0.06, (30, 12))
-            assert_same_book(book_of(found, none, v, u), book)
+    found = deepcopy(state)
+    codebook_kernels.follow(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), (30, 12), found)
+    for v, u in np.ndindex(image.shape[:2]):
+        book = book_of(state, none, v, u)
+        x, chance = image[v, u].astype(float), float(likelihood[v, u])
+        reference.follow(book, x, gain.astype(float), chance, NOW, 15, 0.06, (30, 12))
+        assert_same_book(book_of(found, none, v, u), book)
 
 
 def test_a_negative_run_goes_on_from_the_end_to_the_beginning() -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from recordings import data_path
 from reference_foreground import FLOOR, SHIRT, near_modes, noisy, random_modes
 from refusals import refused
+from strategies import examples
 
 from stseg.arrays import Boxes, Bytes, Floats
 from stseg.config import ChromaticConfig
@@ -28,7 +29,6 @@ from stseg.foreground.background.gaussian_kernels import (
 from stseg.foreground.background.posterior import Priors, pool_log_odds
 from stseg.foreground.background.temporal_mode import commonest_colours
 from stseg.foreground.channel_gain import channel_gains, fill_gains
-from stseg.kernels.accelerate import python_form
 
 SIZE = (12, 12)
 
@@ -146,7 +146,7 @@ def test_gains_are_the_centroids_of_the_peaks_of_histograms(seed: int) -> None:
 GAUSSIAN_MODELS = st.sampled_from([MixtureConfig(), ChromaticConfig()])
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(seed=st.integers(0, 10**6), modes=st.integers(1, 4), config=GAUSSIAN_MODELS)
 def test_log_odds_are_their_formula(seed: int, modes: int, config: reference.GaussianConfig) -> None:
     rng = np.random.default_rng(seed)
@@ -154,12 +154,11 @@ def test_log_odds_are_their_formula(seed: int, modes: int, config: reference.Gau
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3)
     expected = reference.log_odds(image, gain, *state, config)
     log_odds, planes = np.empty(image.shape[:2], np.float32), reference.planes_of(*state)
-    for function in (fill_mixture_log_odds, python_form(fill_mixture_log_odds)):
-        function(image, gain.astype(np.float32), planes, config.background_weight, Priors.of(config), log_odds)
-        np.testing.assert_allclose(log_odds, expected, atol=2e-3)
+    fill_mixture_log_odds(image, gain.astype(np.float32), planes, config.background_weight, Priors.of(config), log_odds)
+    np.testing.assert_allclose(log_odds, expected, atol=2e-3)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(seed=st.integers(0, 10**6), modes=st.integers(1, 4), config=GAUSSIAN_MODELS)
 def test_modes_learn_by_their_rules(seed: int, modes: int, config: reference.GaussianConfig) -> None:
     rng = np.random.default_rng(seed)
@@ -172,11 +171,10 @@ def test_modes_learn_by_their_rules(seed: int, modes: int, config: reference.Gau
         least, tolerance = config.chromatic_sd, 1e-3
     numbers = config.background_weight, config.match_distance, config.initial_sd, least, config.minimum_sd
     constants = Adaptation(*(np.float32(number) for number in numbers))
-    for function in (adapt_mixture, python_form(adapt_mixture)):
-        found = reference.planes_of(*state)
-        function(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
-        for one, other in zip(reference.modes_of(found), expected, strict=True):
-            np.testing.assert_allclose(one, other, rtol=tolerance, atol=tolerance)
+    found = reference.planes_of(*state)
+    adapt_mixture(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
+    for one, other in zip(reference.modes_of(found), expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=tolerance, atol=tolerance)
 
 
 def test_rows_between_the_turns_stay_as_they_are() -> None:
@@ -192,14 +190,13 @@ def test_rows_between_the_turns_stay_as_they_are() -> None:
 
 def test_the_strongest_mode_comes_first() -> None:
     state = reference.planes_of(*random_modes(np.random.default_rng(3), 4, MixtureConfig()))
-    for function in (put_strongest_first, python_form(put_strongest_first)):
-        found = state.copy()
-        function(0, 1, found)
-        assert (found[:1, -1] >= found[:, -1]).all()
-        np.testing.assert_array_equal(np.sort(found, axis=0), np.sort(state, axis=0))
+    found = state.copy()
+    put_strongest_first(0, 1, found)
+    assert (found[:1, -1] >= found[:, -1]).all()
+    np.testing.assert_array_equal(np.sort(found, axis=0), np.sort(state, axis=0))
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(seed=st.integers(0, 10**6), radius=st.integers(0, 3))
 def test_pooling_is_a_mean_over_the_pixels_that_exist(seed: int, radius: int) -> None:
     log_odds = np.random.default_rng(seed).uniform(-5, 5, (5, 7)).astype(np.float32)
@@ -208,7 +205,7 @@ def test_pooling_is_a_mean_over_the_pixels_that_exist(seed: int, radius: int) ->
     np.testing.assert_allclose(likelihood, reference.pooled(log_odds.astype(float), radius), rtol=1e-5)
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(seed=st.integers(0, 10**6), count=st.integers(1, 9))
 def test_the_commonest_colour_is_the_one_with_most_companions(seed: int, count: int) -> None:
     frames = np.random.default_rng(seed).integers(0, 60, (count, 2, 3, 3)).astype(np.uint8)
@@ -242,7 +239,7 @@ def test_a_box_holds_a_soft_body_of_its_score() -> None:
     assert not likelihood[~inside].any()
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 10**6), count=st.integers(0, 3), step=st.integers(1, 4))
 def test_the_box_map_is_its_definition(seed: int, count: int, step: int) -> None:
     rng = np.random.default_rng(seed)
@@ -258,7 +255,7 @@ def test_boxes_that_are_no_boxes_are_refused() -> None:
     refused(InputError, "step", box_likelihood, boxes_of((0, 0, 1, 1)), (4, 4), step=0)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(arrays(np.uint16, (6, 5), elements=st.sampled_from((0, 0, 0, 3, 7, 65535))))
 @example(np.zeros((6, 5), np.uint16))
 def test_instance_boxes_are_tight(instances: NDArray[np.uint16]) -> None:

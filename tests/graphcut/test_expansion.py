@@ -9,6 +9,7 @@ import reference_expansion as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from maxflow.fastmin import aexpansion_grid
+from strategies import examples
 
 from stseg.arrays import Ints
 from stseg.graphcut import qpbo
@@ -46,7 +47,7 @@ def some_start(energy: LabelEnergy, seed: int) -> Ints:
 TINY = [(2, 4), (2, 2, 2), (8,), (1, 7)]
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.integers(0, 999), st.sampled_from(TINY))
 def test_energy_by_definition(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_energy(seed, shape, 3, 5)
@@ -63,7 +64,7 @@ def test_an_inadmissible_label_is_refused() -> None:
             expand(energy, np.array(labels))
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.integers(0, 999), st.sampled_from(TINY), st.integers(0, 6))
 def test_each_move_is_optimal_and_smallest(seed: int, shape: tuple[int, ...], weight: int) -> None:
     energy = random_energy(seed, shape, 3, weight)
@@ -80,7 +81,7 @@ def test_each_move_is_optimal_and_smallest(seed: int, shape: tuple[int, ...], we
         assert energy.of(moves.labels) < before if changed else energy.of(moves.labels) == before
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.integers(0, 999), st.sampled_from(TINY))
 def test_no_expansion_improves_the_result(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_energy(seed, shape, 3, 4)
@@ -161,7 +162,7 @@ def least(energy: QuadraticEnergy) -> int:
     return min(energy.of(np.array(labels)) for labels in product((False, True), repeat=len(energy.unary)))
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.integers(0, 9999), st.integers(1, 9), st.integers(0, 20), st.sampled_from([(-5, 0), (-5, 5), (0, 5)]))
 def test_the_minimum_is_that_of_all_labellings(seed: int, nodes: int, edges: int, weights: tuple[int, int]) -> None:
     energy = quadratic_energy(seed, nodes, edges, *weights)
@@ -171,7 +172,7 @@ def test_the_minimum_is_that_of_all_labellings(seed: int, nodes: int, edges: int
         assert found.gap == 0
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 9999))
 def test_the_gap_bounds_what_local_search_misses(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(qpbo, "COMPONENT_LIMIT", 0)

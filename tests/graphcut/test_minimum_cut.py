@@ -1,6 +1,5 @@
 """The minimum cut: its energy by definition, its minimum by enumeration and by other solvers."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -11,10 +10,11 @@ import pytest
 import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import track, write_recording
+from recordings import compiled_only, track, write_recording
 from refusals import refused
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
+from strategies import examples
 
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
@@ -23,13 +23,12 @@ from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.sign_sets import LABEL_ONE, UNDECIDED
 from stseg.graphcut.solvers import SOLVERS, Solver, find_solver
 from stseg.graphcut.sparse import CAPACITY_LIMIT, sparse_cut
+from stseg.kernels.accelerate import COMPILED
 from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.cut_energy import build_energy, neighbourhood
 
 TINY = [(1, 1, 3, 4), (2, 1, 2, 3), (2, 2, 1, 3), (3, 1, 2, 2), (2, 2, 3, 1), (1, 3, 2, 2), (4, 1, 1, 3), (12, 1, 1, 1)]
 """Volumes of at most twelve cells, with and without each of the axes."""
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
-"""Whether kernels run as plain Python, slowly."""
 
 
 def window(
@@ -60,7 +59,7 @@ def smooth_window(seed: int, shape: tuple[int, ...], neighbours: int = 8, smooth
     )
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.integers(0, 999), st.sampled_from(TINY), st.sampled_from((8, 80)))
 def test_energy_by_definition(seed: int, shape: tuple[int, ...], neighbours: int) -> None:
     energy = window(seed, shape, 9, 5, neighbours=neighbours)
@@ -92,7 +91,7 @@ def test_neighbourhoods_are_half_of_all_neighbours() -> None:
         assert [offset[0] for offset in offsets] == sorted(offset[0] for offset in offsets)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.integers(0, 999), st.integers(0, 3))
 def test_successors_are_injective(seed: int, drift: int) -> None:
     rng = np.random.default_rng(seed)
@@ -106,7 +105,7 @@ def test_successors_are_injective(seed: int, drift: int) -> None:
 
 @pytest.mark.parametrize("shape", TINY)
 def test_the_cut_is_the_smallest_of_the_minima(shape: tuple[int, ...]) -> None:
-    for seed in range(8 if INTERPRETED else 24):
+    for seed in range(24 if COMPILED else 8):
         energy = window(seed, shape, unary=3, capacity=2, neighbours=(8, 80)[seed % 2])
         least, smallest = reference.least_energy(energy)
         occupied = minimum_cut(energy).occupied
@@ -133,7 +132,7 @@ def flow_value(energy: GridEnergy) -> int:
 @pytest.mark.parametrize("kind", ["whole numbers", "volume", "smooth volume"])
 @pytest.mark.parametrize("neighbours", [8, 80])
 def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, neighbours: int) -> None:
-    for seed in range(1 if INTERPRETED else 3):
+    for seed in range(3 if COMPILED else 1):
         if kind == "whole numbers":
             energy = window(seed, shape, 6, 2, 2, neighbours)
         else:
@@ -147,7 +146,7 @@ def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, nei
         assert cut.nodes <= energy.unary.size
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.integers(0, 999), st.integers(1, 60), st.sampled_from((8, 80)))
 def test_the_reduction_is_exact(seed: int, strength: int, neighbours: int) -> None:
     energy = window(seed, (3, 2, 4, 5), unary=strength, capacity=4, neighbours=neighbours)
@@ -187,7 +186,7 @@ def test_smoothness_bridges_a_gap_along_the_motion() -> None:
     assert not straight[2].any()
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(st.integers(0, 9999), st.integers(1, 30), st.integers(0, 90))
 def test_sparse_cut_of_any_graph(seed: int, nodes: int, edges: int) -> None:
     rng = np.random.default_rng(seed)
@@ -216,13 +215,13 @@ def test_cuts_in_two_threads_at_once_agree() -> None:
     alone = [minimum_cut(energy).occupied for energy in windows]
     assert any(reduce(energy).left.size > 200 for energy in windows)
     with ThreadPoolExecutor(2) as callers:
-        for _ in range(3 if INTERPRETED else 60):
+        for _ in range(60 if COMPILED else 3):
             results = [callers.submit(minimum_cut, energy) for energy in windows]
             for expected, result in zip(alone, results, strict=True):
                 np.testing.assert_array_equal(result.result(timeout=60).occupied, expected)
 
 
-@pytest.mark.skipif(INTERPRETED, reason="too large for plain Python")
+@compiled_only
 def test_real_windows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     cuts = Mock(side_effect=minimum_cut)
     monkeypatch.setitem(SOLVERS, "stseg", Solver(cuts, sparse_cut))
@@ -235,5 +234,5 @@ def test_real_windows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_pymaxflow_is_taken_where_kernels_are_not_compiled() -> None:
-    assert find_solver("stseg") is SOLVERS["pymaxflow" if INTERPRETED else "stseg"]
+    assert find_solver("stseg") is SOLVERS["stseg" if COMPILED else "pymaxflow"]
     assert find_solver("pymaxflow") is SOLVERS["pymaxflow"]

@@ -10,6 +10,7 @@ import reference_error_rates as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, likelihoods, no_boxes, people, rig_of
+from strategies import examples
 
 from stseg.arrays import Flags, Floats, Ints, ViewEvidence
 from stseg.bodies.pillars import inside_bodies
@@ -65,7 +66,7 @@ def random_levels(rng: np.random.Generator, shape: tuple[int, ...], chance: Floa
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 def test_counts_by_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape = (2, 3, 4)

@@ -9,7 +9,7 @@ import reference_core as reference
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, detector_of, evidence_of, found, looking, people, rig_of
-from strategies import numbers, rigs
+from strategies import examples, numbers, rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
 from stseg.bodies.box_fit import TOLERANCE
@@ -76,7 +76,7 @@ def test_weights_fall_with_clutter_down_to_the_median(others: list[float], clutt
 KINDS: list[SamplingKind] = ["point", "footprint"]
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(rigs(most=2), st.sampled_from(KINDS))
 def test_cells_are_looked_up_where_they_project(rig: Rig, kind: SamplingKind) -> None:
     sampling = Sampling.of(rig, kind)
@@ -120,7 +120,7 @@ def test_a_footprint_has_the_spread_of_the_cells_image(distortion: Sequence[floa
     np.testing.assert_allclose(footprint[whole][:, 2:], sides[whole], atol=0.51, rtol=0.02)
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(st.integers(0, 999))
 def test_likelihood_per_plane_by_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ import reference_pixel_labels as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import corner_cameras, likelihoods, looking, people, room
+from strategies import examples
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
 from stseg.bodies.outlines import outlines
@@ -85,7 +86,7 @@ def test_a_person_out_of_view_has_no_patch() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 def test_the_product_is_the_mean_over_all_combinations_of_draws(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     drawn = [rng.random((3, 2, 3)) < 0.6 for _ in range(count)]
@@ -103,7 +104,7 @@ def test_the_most_likely_label_is_the_start() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 def test_weights_follow_the_sigmoid_and_are_not_negative(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 60, (3, 4, 3)).astype(np.uint8)
     config = LabelConfig(boundary_weight=3.0, contrast_limit=40.0, contrast_slope=10.0)
@@ -144,7 +145,7 @@ def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikeli
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 def test_the_energy_of_the_paper_with_pruned_labels(seed: int) -> None:
     ours, shown, foreground, image, config = problem(seed, (2, 3))
     shares, shape = reference.dense(shown), shown.background.shape
@@ -256,7 +257,7 @@ def density(colour: Floats, t: int, s: int, worn: ViewAppearance) -> float:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 def test_ratios_are_those_of_the_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     likelihood, rows, image = two_rectangles(rng)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from strategies import numbers
+from strategies import examples, numbers
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
@@ -171,7 +171,7 @@ def test_a_blob_holds_the_detection_inside_it() -> None:
         assert found.person.tolist() == person
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
 @example([(2.0, 0.0)], 0)
 @example([(1.0, 0.0)], 767)
@@ -202,7 +202,7 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
     random = np.random.default_rng(seed)
     label = random.choice(np.array([0, 0, UNASSIGNED, 2, 5, 9], np.int32), GRID.shape)

@@ -7,7 +7,7 @@ import pytest
 import reference_expansion as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import numbers
+from strategies import examples, numbers
 
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.config import MotionConfig, SegmentationConfig, TrackingConfig
@@ -39,7 +39,7 @@ def random_window(seed: int, shape: tuple[int, ...]) -> GridEnergy:
     return GridEnergy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, successor_cells(motion))
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(st.integers(0, 999), st.sampled_from([(3, 2, 3, 4), (2, 3, 4, 3), (1, 2, 3, 3), (4, 1, 1, 5)]))
 def test_a_subgraph_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_window(seed, shape)
@@ -84,7 +84,7 @@ def places_at(
     )
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(numbers(0.6, 1.2), numbers(0.4, 1.0), numbers(0, 2.2), numbers(0.01, 0.3), st.booleans())
 def test_shares_by_definition(x: float, y: float, height: float, spread: float, gone: bool) -> None:
     places = places_at((0.8, 0.7), (1.1, 0.6), spread=spread)

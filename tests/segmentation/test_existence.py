@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import room
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+from strategies import examples
 
 from stseg.arrays import Floats, Ints
 from stseg.config import Config
@@ -125,7 +126,7 @@ def greatest_gain(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> float:
     return best
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.integers(0, 9999))
 def test_paths_are_those_of_greatest_gain(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -141,7 +142,7 @@ def test_paths_are_those_of_greatest_gain(seed: int) -> None:
     np.testing.assert_allclose(total, greatest_gain(gain, start, end, bonus), atol=1e-9)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.integers(0, 9999))
 def test_marginals_are_those_of_all_labellings(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from reference_simulate import extents, hits, shade
 from refusals import refused
 from scipy.spatial.distance import pdist
-from strategies import BARREL, cameras, numbers
+from strategies import BARREL, cameras, examples, numbers
 
 from stseg.arrays import Floats
 from stseg.commands.simulate import simulate
@@ -100,7 +100,7 @@ def test_half_the_cameras_are_among_the_whole() -> None:
     np.testing.assert_array_equal(whole.views[2].image, half.views[1].image)
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(camera=cameras(size=(80, 60)), depth=st.floats(0.5, 20.0))
 def test_rays_go_through_the_points_that_their_pixels_show(camera: Camera, depth: float) -> None:
     rays = pixel_rays(camera)
@@ -146,7 +146,7 @@ def test_clothes_belong_to_a_person() -> None:
     assert own_clothing(5, 3).shape[0] == len(PARTS)
 
 
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(
     ground=st.lists(st.tuples(numbers(-1.6, 1.6), numbers(-1.6, 1.6)), min_size=1, max_size=3),
     phase=st.floats(0.0, 6.2),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recordings import compiled_only
 from refusals import refused
 from scenes import boxes, found, people, room
 
@@ -22,7 +23,6 @@ from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Grid, Rig
 from stseg.io.recording.frames import FrameSet
-from stseg.kernels.accelerate import COMPILED
 from stseg.records.blobs import Blobs
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, WINDOW
@@ -35,7 +35,6 @@ from stseg.tracking.windows.encounters import encounters, touches
 from stseg.tracking.windows.windows import windows
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
-INTERPRETED = not COMPILED
 
 
 def standing(heights: tuple[float, ...] = (1.7,)) -> SceneSpec:
@@ -140,13 +139,13 @@ def switches(name: str, kind: str, stop: int) -> int:
     return scores.switches
 
 
-@pytest.mark.skipif(INTERPRETED, reason="whole scenes need the compiler")
-@pytest.mark.parametrize("name", SCENES)
+@compiled_only
+@pytest.mark.parametrize("name", ["crossing", *(pytest.param(name, marks=pytest.mark.slow) for name in SCENES[1:])])
 def test_nobody_is_taken_for_somebody_else_from_boxes(name: str) -> None:
     assert switches(name, "boxes", NAMED[name].frames) == 0
 
 
-@pytest.mark.skipif(INTERPRETED, reason="whole scenes need the compiler")
+@compiled_only
 @pytest.mark.parametrize("name", ["crossing", "border"])
 def test_nobody_is_taken_for_somebody_else_from_silhouettes(name: str) -> None:
     """The first six seconds, in which people cross."""
