@@ -1,17 +1,16 @@
 """Plain twin of the identity search: every partition of a few rows into people, each scored as a whole."""
 
 from collections.abc import Iterator
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
-from scipy.stats import norm
 
 from stseg.arrays import Floats
 from stseg.config import MotionConfig
 from stseg.identities.evidence.observations import Observations
 from stseg.tracking.filter.motion_model import process_noise, transition
 
-BIRTH, ABSENCE, LEAST, NEAR = 6.0, 1.0, -25.0, 1.0
+BIRTH, ABSENCE, LEAST = 6.0, 1.0, -25.0
 
 
 def partitions(rows: int) -> Iterator[list[int]]:
@@ -40,7 +39,6 @@ def score(seen: Observations, names: list[int], spread: Floats, motion: MotionCo
         total += path(seen, own, seconds, motion) - BIRTH * seen.inside[name] + sizes(seen, own, spread)
         if seconds[-1] - seconds[own[-1]] > longest:
             total -= BIRTH * seen.inside[own[-1]]
-    total -= sum(crossings(seen, names, k, motion) for k in range(1, len(seen.seconds)))
     broken = [row for row in np.flatnonzero(seen.certain) if names[row] != names[seen.previous[row]]]
     return -np.inf if broken else total
 
@@ -60,23 +58,6 @@ def path(seen: Observations, own: list[int], seconds: Floats, motion: MotionConf
         total -= float(np.log(2 * np.pi * np.sqrt(np.linalg.det(around))))
         gain = covariance[:, :2] @ np.linalg.inv(around)
         state, covariance = state + gain @ off, covariance - gain @ covariance[:2]
-    return total
-
-
-def crossings(seen: Observations, names: list[int], k: int, motion: MotionConfig) -> float:
-    """Cost of all pairs of people who cross between frame k - 1 and frame k."""
-    before, now = ({names[row]: row for row in range(*seen.start[at : at + 2].tolist())} for at in (k - 1, k))
-    bend, total = motion.speed_spread * (seen.seconds[k] - seen.seconds[k - 1]) / 4, 0.0
-    for one, other in combinations(sorted(before.keys() & now.keys()), 2):
-        start, stop = (seen.ground[rows[one]] - seen.ground[rows[other]] for rows in (before, now))
-        if max(np.hypot(*start), np.hypot(*stop)) < NEAR:
-            rows = [before[one], before[other], now[one], now[other]]
-            offset = norm(0.0, np.sqrt(seen.variance[rows].sum() / 2 + 2 * bend**2))
-            way = np.linspace(start, stop, 20001)
-            least = float(np.hypot(*way.T).min())
-            ends = float(min(np.hypot(*start), np.hypot(*stop)))
-            apart = [offset.sf(seen.room - d) + offset.cdf(-seen.room - d) for d in (ends, least)]
-            total += float(np.log(apart[0] / apart[1]))
     return total
 
 

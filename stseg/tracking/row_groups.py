@@ -9,8 +9,8 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
 
-_ENCOUNTER_DISTANCE = 0.6
-"""Distance of an encounter, metres."""
+EXCHANGE_DISTANCE = 0.8
+"""Distance below which the filter may have exchanged two tracks, metres: they meet."""
 
 
 def isolated_tracklets(trajectory: Rows, frame_rate: float) -> list[Ints]:
@@ -32,7 +32,7 @@ def _keys(track: Ints, frame: Ints) -> Ints:
 
 def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
     """Tracks and frames of the closest approach of each encounter."""
-    pairs, away = near_rows(trajectory, _ENCOUNTER_DISTANCE)
+    pairs, away = near_rows(trajectory, EXCHANGE_DISTANCE)
     track, frame = trajectory["id"][pairs], trajectory["frame"][pairs[:, 0]]
     order = np.lexsort((frame, track[:, 1], track[:, 0]))
     track, frame, away = track[order], frame[order], away[order]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference_identities import crossings, greatest_score, score
+from reference_identities import greatest_score, score
 from refusals import refused
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
 
@@ -24,7 +24,6 @@ from stseg.identities.search import beam_search as search
 from stseg.identities.search.beam_search import SearchLimits, search_identities
 from stseg.identities.search.choice import choose_distinct, empty_present
 from stseg.identities.search.constraints import Constraints
-from stseg.identities.search.costs import crossing, crossings_of
 from stseg.identities.search.extension import Alternatives
 from stseg.identities.search.hypotheses import Hypotheses, Pasts
 from stseg.io.runfile.runs import Run, read_run
@@ -55,23 +54,6 @@ def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
         names = found(seen, hypotheses=5000).tolist()
     best = greatest_score(seen, MODEL.spread, CONFIG.motion, LONGEST) if len(rows) else 0.0
     assert score(seen, names, MODEL.spread, CONFIG.motion, LONGEST) == pytest.approx(best, abs=1e-6)
-
-
-@pytest.mark.parametrize("away", [0.0, 0.2])
-def test_two_side_by_side_do_not_pass_through_each_other(away: float) -> None:
-    """Two of one height, between two frames exchanged to within `away` metres: less likely than the distance says."""
-    rows = rows_of({k: (straight(0, 0.35 * k, 0, 0), 1.7, range(2)) for k in (1, 2)}, noise=0.0)
-    rows["y"][rows["frame"] == 1] += away
-    seen = seen_of(rows)
-    stay, pass_by = (crossings(seen, names, 1, CONFIG.motion) for names in ([0, 1, 0, 1], [0, 1, 1, 0]))
-    assert stay == 0.0
-    assert pass_by > 0.5
-    bend = (CONFIG.motion.speed_spread / RATE / 4) ** 2
-    own = crossings_of(0, 2, 4, seen.ground, seen.variance, bend, seen.room)
-    last = np.array([0, 1, -1])
-    assert crossing(0, 0, 1, 1, last, own) == 0.0
-    assert crossing(0, 1, 1, 0, last, own) == pytest.approx(pass_by, abs=1e-4)
-    assert crossing(0, 1, 1, 2, last, own) == 0.0  # somebody new has no past
 
 
 def test_names_that_are_final_early_belong_to_one_hypothesis() -> None:

@@ -12,10 +12,8 @@ from stseg.config import Config
 from stseg.identities.evidence.size_model import SizeModel
 from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.border import Border
-from stseg.tracking.row_groups import near_rows
+from stseg.tracking.row_groups import EXCHANGE_DISTANCE, near_rows
 
-_EXCHANGE_DISTANCE = 0.8
-"""Distance below which the filter may have exchanged two tracks, metres."""
 _BIRTH_TIME = 1.0
 """Time within which births in one track count as one, seconds."""
 _LEAST_PLACE_ERROR = 0.05
@@ -62,8 +60,6 @@ class Observations:
     """float64 (n, size): inverse variance of each size."""
     information: Floats
     """float64 (n, size): the precision times the deviation of the size from the population's mean."""
-    room: float
-    """Distance below which two bodies overlap, metres."""
 
     def birth(self) -> Ints:
         """A number of each filter track and second, of which births are one, int64 (n,)."""
@@ -98,7 +94,7 @@ class Observations:
         return Observations(
             self.order[part], self.start[start : stop + 1] - first, self.seconds[start:stop], self.ground[part],
             self.variance[part], previous, self.certain[part] & (previous >= 0), self.inside[part],
-            self.precision[part], self.information[part], self.room,
+            self.precision[part], self.information[part],
         )  # fmt: skip
 
 
@@ -122,7 +118,7 @@ def observe(
         order, start, frames / frame_rate, ground,
         np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2), previous,
         _certain(rows, previous), border.inside(ground, config.detection.border_width), precision,
-        information, config.detection.minimum_distance,
+        information,
     )  # fmt: skip
 
 
@@ -145,6 +141,6 @@ def _previous(rows: Rows) -> Ints:
 def _certain(rows: Rows, previous: Ints) -> Flags:
     """Rows that follow their track in the very next frame, far from all others in both."""
     alone = np.ones(len(rows), bool)
-    alone[near_rows(rows, _EXCHANGE_DISTANCE)[0]] = False
+    alone[near_rows(rows, EXCHANGE_DISTANCE)[0]] = False
     follows = (previous >= 0) & (rows["frame"] - rows["frame"][previous] == 1)
     return np.asarray(alone & alone[previous] & follows)

@@ -14,7 +14,7 @@ from stseg.arrays import Floats, Ints
 from stseg.identities.evidence.observations import ObservedRows
 from stseg.identities.search.choice import choose_distinct, empty_present
 from stseg.identities.search.constraints import BoundPeople, binding_people, mark_of
-from stseg.identities.search.costs import Crossings, RowCosts, crossings_of, row_costs
+from stseg.identities.search.costs import RowCosts, row_costs
 from stseg.identities.search.extension import (
     Alternatives,
     Extension,
@@ -42,10 +42,6 @@ class Frames(NamedTuple):
     """int64 (frame + 1,): first row of each."""
     seconds: Floats
     """float64 (frame,)."""
-    bend: Floats
-    """float64 (frame,): variance of a walk, since the frame before, from the straight path, square metres."""
-    room: float
-    """Distance below which two bodies overlap, metres."""
 
 
 @kernel
@@ -70,13 +66,11 @@ def extend_beam(
         rows, now = stop - first, frames.seconds[k]
         slots = -(-(slots_in_use(hypotheses.past, number) + rows) // _SLOT_STEP) * _SLOT_STEP
         slots = min(slots, hypotheses.past.shape[1])
-        before = frames.start[max(k - 1, 0)]
-        crossings = crossings_of(before, first, stop, observed.ground, observed.variance, frames.bend[k], frames.room)
         costs = row_costs(pasts, size, first, rows, now, observed, rules)
         column, extension = np.empty((number, rows), np.int64), empty_extension(slots, first, rows, observed.certain)
         found, present = empty_alternatives(number, slots, len(extension.doubtful)), empty_present(number, slots)
         total = _fill_alternatives(
-            hypotheses, pasts, slots, k, frames, costs, observed, people, rules, crossings, extension, column, found
+            hypotheses, pasts, slots, k, frames, costs, observed, people, rules, extension, column, found
         )
         chosen, mark = np.empty(len(successors.score), np.int64), _marks(number, hypotheses, people, first)
         number = choose_distinct(
@@ -109,14 +103,14 @@ def _marks(number: int, hypotheses: Hypotheses, people: BoundPeople, first: int)
 @kernel
 def _fill_alternatives(
     hypotheses: Hypotheses, pasts: Pasts, slots: int, k: int, frames: Frames, row_costs: RowCosts,
-    observed: ObservedRows, people: BoundPeople, rules: Rules, all_crossings: Crossings, extension: Extension,
-    column: Ints, alternatives: Alternatives,
+    observed: ObservedRows, people: BoundPeople, rules: Rules, extension: Extension, column: Ints,
+    alternatives: Alternatives,
 ) -> int:  # fmt: skip
     """Fill the alternatives of all hypotheses for the rows of the k-th frame, and count them.
 
     Fill the slots of the best assignments, column (hypothesis, row), too.
     """
-    costs, crossings, one, found = pointed(row_costs), pointed(all_crossings), pointed(extension), pointed(alternatives)
+    costs, one, found = pointed(row_costs), pointed(extension), pointed(alternatives)
     first, total = frames.start[k], 0
     for h in range(len(column)):
         end_identities(hypotheses, pasts, h, first, frames.seconds[k], observed, people, rules)
@@ -129,7 +123,7 @@ def _fill_alternatives(
             cost += one.cost[i, one.assigned[i]]
             column[h, i] = one.slot[one.assigned[i]]
         score = hypotheses.score[h] - cost
-        total = add_alternatives(h, one, identities, score, crossings, rules.alternative_loss, total, found)
+        total = add_alternatives(h, one, identities, score, rules.alternative_loss, total, found)
     return total
 
 

@@ -139,7 +139,7 @@ def search_identities(
         for _ in range(2)
     )
     rows, bound = observations.rows(), people.bound(observations.start)
-    beam = _frames(observations, motion), rows, bound, _rules(sizes, motion, limits)
+    beam = Frames(observations.start, observations.seconds), rows, bound, _rules(sizes, motion, limits)
     history, number, size, begin = _History(np.full(len(observations.order), -1)), 1, 0, 0
     while begin < len(observations.seconds):
         since = history.steps[0].seconds if history.steps else observations.seconds[begin]
@@ -156,13 +156,6 @@ def search_identities(
         begin = stop
     history.decide(np.inf, number)
     return BestHypothesis(history.name, float(hypotheses[0].score[0]))
-
-
-def _frames(observations: Observations, motion: MotionConfig) -> Frames:
-    """The frames of some observations."""
-    steps = np.diff(observations.seconds, prepend=observations.seconds[:1]).tolist()
-    bend = np.array([(motion.speed_spread * step / 4.0) ** 2 for step in steps])
-    return Frames(observations.start, observations.seconds, bend, observations.room)
 
 
 def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rules:

@@ -14,15 +14,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints
 from stseg.identities.evidence.observations import ObservedRows
 from stseg.identities.search.constraints import BoundPeople, is_awaited
-from stseg.identities.search.costs import (
-    CONTRADICTION,
-    FORBIDDEN,
-    UNLIKELY,
-    Crossings,
-    RowCosts,
-    crossing,
-    crossings_with_others,
-)
+from stseg.identities.search.costs import CONTRADICTION, FORBIDDEN, UNLIKELY, RowCosts
 from stseg.identities.search.hypotheses import FREE, Hypotheses, Pasts, Rules
 from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.linear_assignment import fill_assignment_of_least_cost
@@ -35,8 +27,6 @@ class Extension(NamedTuple):
     """int64 (identity + 1,): slot of each; -1 for a new one."""
     name: Ints
     """int64 (identity + 1,): first row of each; -1 for a new one."""
-    last: Ints
-    """int64 (identity + 1,): last row of each; -1 for a new one."""
     cost: Floats
     """float64 (row, identity + 1): nats."""
     assigned: Ints
@@ -57,8 +47,8 @@ def empty_extension(most: int, first: int, rows: int, certain: Flags) -> Extensi
             doubtful[number] = i
             number += 1
     return Extension(
-        np.empty(most + 1, np.int64), np.empty(most + 1, np.int64), np.empty(most + 1, np.int64),
-        np.empty((rows, most + 1)), np.empty(rows, np.int64), np.empty(most + 1, np.bool_), doubtful[:number],
+        np.empty(most + 1, np.int64), np.empty(most + 1, np.int64), np.empty((rows, most + 1)),
+        np.empty(rows, np.int64), np.empty(most + 1, np.bool_), doubtful[:number],
     )  # fmt: skip
 
 
@@ -91,7 +81,7 @@ def fill_identities(hypotheses: Hypotheses, pasts: Pasts, h: int, costs: RowCost
     for s in range(hypotheses.past.shape[1]):
         p = hypotheses.past[h, s]
         if p >= 0:
-            one.slot[number], one.name[number], one.last[number] = s, pasts.name[p], pasts.last[p]
+            one.slot[number], one.name[number] = s, pasts.name[p]
             one.has_row[number] = costs.follower[p] >= 0
             if costs.follower[p] >= 0:
                 assigned[costs.follower[p]] = number
@@ -99,7 +89,7 @@ def fill_identities(hypotheses: Hypotheses, pasts: Pasts, h: int, costs: RowCost
             for i in doubtful:
                 one.cost[i, number] = costs.cost[p, i]
             number += 1
-    one.slot[number] = one.name[number] = one.last[number] = -1
+    one.slot[number] = one.name[number] = -1
     one.has_row[number] = False
     for i in range(len(assigned)):
         one.cost[i, number] = costs.begun[i]
@@ -191,20 +181,14 @@ def empty_alternatives(hypotheses: int, slots: int, doubtful: int) -> Alternativ
 
 @part
 def add_alternatives(
-    h: int, one: Extension, identities: int, score: float, crossings: Crossings, most: float, number: int,
-    found: Alternatives,
-) -> int:  # fmt: skip
+    h: int, one: Extension, identities: int, score: float, most: float, number: int, found: Alternatives
+) -> int:
     """Add the best assignment, and those that differ from it by one exchange of two rows, or another identity of one.
 
-    Hypothesis `h` has so many identities, and its best assignment a score, nats, but for crossings: what it costs that
-    two people cross. `most` is the greatest loss of an alternative, nats, but for crossings. Returned is the number of
-    alternatives in `found`, which were `number` before.
+    Hypothesis `h` has so many identities, and its best assignment a score, nats. `most` is the greatest loss of an
+    alternative, nats. Returned is the number of alternatives in `found`, which were `number` before.
     """
     cost, assigned, slot = one.cost, one.assigned, one.slot
-    crossed = crossings.cost.size > 0
-    if crossed:
-        for i in range(len(assigned)):
-            score -= crossings_with_others(i, assigned[i], -1, assigned, one.last, crossings) / 2.0
     _fill(found, number, h, -1, -1, -1, -1, score)
     number += 1
     for a in range(len(one.doubtful)):
@@ -216,9 +200,6 @@ def add_alternatives(
             if j >= 0:
                 loss = cost[i, to] + cost[j, assigned[i]] - cost[i, assigned[i]] - cost[j, to]
             if loss < most and to != assigned[i] and (j >= 0 or not one.has_row[to]):
-                if crossed:
-                    loss += _crossings_of(i, to, j, assigned[i], assigned, one.last, crossings)
-                    loss -= _crossings_of(i, assigned[i], j, to, assigned, one.last, crossings)
                 _fill(found, number, h, i, slot[to], j, slot[assigned[i]], score - loss)
                 number += 1
     return number
@@ -229,13 +210,3 @@ def _fill(found: Alternatives, number: int, h: int, i: int, to: int, j: int, bac
     change = found.change
     change[number, 0], change[number, 1], change[number, 2], change[number, 3], change[number, 4] = h, i, to, j, back
     found.value[number] = value
-
-
-@part
-def _crossings_of(i: int, one: int, j: int, other: int, assigned: Ints, last: Ints, crossings: Crossings) -> float:
-    """Cost of crossings of one row or two (-1 for none) as those of identities, with each other and others, nats."""
-    total = crossings_with_others(i, one, j, assigned, last, crossings)
-    if j >= 0:
-        total += crossings_with_others(j, other, i, assigned, last, crossings)
-        total += crossing(i, one, j, other, last, crossings)
-    return total
