@@ -147,7 +147,7 @@ class RunFilm:
         is_below = foot.scale > side.scale
         self._plan = foot if is_below else side
         self._corner = (views_size[0] - foot.size[0]) // 2 if is_below else views_size[0], views_size[1] * is_below
-        self._ground = ground_sheet(self._plan, rig, views.max(axis=0), rig.name)
+        self._ground, _ = ground_sheet(self._plan, rig, views.max(axis=0), rig.name)
         ends = np.add(self._corner, self._plan.size)
         wide, tall = np.maximum(views_size, ends).tolist()
         self.size = (wide + wide % 2, tall + tall % 2)

@@ -45,9 +45,9 @@ def slide(page: Page, index: int) -> None:
 
 def test_it_loads_without_a_complaint_or_a_request(page: Page) -> None:
     pictures(page)
-    assert page.complaints == []
-    assert page.requests == []
+    assert page.complaints == page.requests == []
     assert page.ask("document.images.length > 5 && [...document.images].every((image) => image.naturalWidth > 0)")
+    assert page.picture(420, 900) and page.ask("document.documentElement.scrollWidth <= innerWidth"), "a telephone"
 
 
 def test_the_complaints_of_a_page_would_be_heard(folder: Path, tmp_path: Path) -> None:
@@ -91,8 +91,7 @@ def test_the_address_chooses_the_frame_and_the_menu_the_plane(page: Page) -> Non
 
 def test_a_drag_turns_the_tracks(page: Page) -> None:
     before = pictures(page)
-    drag = "thread.onpointermove({ buttons: 1, movementX: 40, movementY: 10 })"
-    page.ask(f"{drag}; 0")
+    page.ask("thread.onpointermove({ buttons: 1, movementX: 40, movementY: 10 }); 0")
     after = pictures(page)
     assert [old == new for old, new in zip(before, after, strict=True)] == [True, True, False]
 

@@ -166,11 +166,12 @@ def test_labels_stay_on_the_canvas(points: list[tuple[float, float]]) -> None:
     assert (centres >= (15, 8)).all() and (centres <= (385, 292)).all()
 
 
-def test_labels_of_neighbours_do_not_cover_each_other() -> None:
-    points = np.array([[200.0, 150.0], [206.0, 150.0], [200.0, 156.0]])
+def test_labels_of_neighbours_cover_neither_each_other_nor_further_points() -> None:
+    points = np.array([[200.0, 150.0], [206.0, 150.0], [200.0, 156.0], [220.0, 135.0]])
     centres = place_labels(points, [(30, 16)] * 3, (0, 0, 400, 300))
     distances = np.abs(centres[:, None] - centres[None])
     assert ((distances[..., 0] >= 30) | (distances[..., 1] >= 16) | np.eye(3, dtype=bool)).all()
+    assert (np.abs(centres - points[3]) >= (15, 8)).any(axis=1).all()
 
 
 def test_the_overlay_puts_a_dot_where_the_feet_are() -> None:

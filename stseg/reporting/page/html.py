@@ -36,7 +36,7 @@ dt { color: var(--quiet); font-size: 13px }
 dd { margin: 0 }
 header dd { font-size: 18px; white-space: nowrap; font-weight: 600; font-variant-numeric: tabular-nums }
 section { background: #fff; border: 1px solid var(--rule); border-radius: 12px; padding: 24px; margin: 24px 0 }
-figure { margin: 0 }
+figure { margin: 0; min-width: 0 }
 figcaption { color: var(--quiet); font-size: 13px; margin-top: 6px }
 img { max-width: 100%; height: auto; display: block; border-radius: 6px }
 h3 { font-size: 15px; margin: 14px 0 2px }
@@ -69,7 +69,7 @@ td.unsure { color: var(--quiet) }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 20px; align-items: start }
 .pair > figure:last-child:nth-child(odd) { grid-column: 1 / -1; justify-self: center }
 .sheets { display: grid; grid-template-columns: 2fr 1fr; gap: 32px 20px; align-items: start }
-@media (max-width: 900px) { .sheets { grid-template-columns: 1fr } .pair { grid-template-columns: 1fr } }
+@media (max-width: 900px) { .sheets, .pair { grid-template-columns: minmax(0, 1fr) } }
 .chart { width: 100%; height: auto; display: block; margin-top: 8px }
 .chart text { font-size: 12px; fill: var(--quiet); font-variant-numeric: tabular-nums }
 .chart .on { fill: #fff; font-size: 10px; font-weight: 600 }
@@ -88,7 +88,7 @@ th, td { text-align: left; padding: 6px 14px; border-bottom: 1px solid var(--rul
 th { position: sticky; top: 0; background: var(--soft); color: var(--quiet); font-weight: 500; font-size: 13px }
 td i { display: inline-block; width: 12px; height: 12px; border-radius: 4px; margin-right: 8px; vertical-align: -1px }
 td small { color: var(--quiet); margin-left: 6px }
-td:last-child { white-space: normal }
+td:last-child { white-space: normal; min-width: 14em }
 @media print { #time { display: none !important } section { break-inside: avoid } .scroll { max-height: none } }
 """
 

@@ -138,7 +138,7 @@ def chips(
     bounds: tuple[float, float, float, float],
     gap: float = 9.0,
 ) -> None:
-    """A `chip` beside each place (n, 2); see `place_labels` for bounds and gap."""
+    """A `chip` beside the first places of (n, 2); see `place_labels` for bounds, gap and further places."""
     centres = place_labels(places, [chip_size(one, size) for one in words], bounds, gap)
     for one, (u, v), colour in zip(words, centres.tolist(), colours, strict=True):
         chip(canvas, one, (u, v), colour, size)
@@ -215,7 +215,7 @@ def place_labels(
     Parameters
     ----------
     points : float64 (n, 2)
-        Labelled points, pixels.
+        Labelled points, then others that labels keep clear of, pixels.
     sizes
         Width and height of each label, pixels.
     bounds
@@ -225,12 +225,12 @@ def place_labels(
 
     Returns
     -------
-    float64 (n, 2)
+    float64 (label, 2)
     """
     points = np.asarray(points, float).reshape(-1, 2)
     occupied = np.concatenate([points - 5, points + 5], axis=1)
-    centres = np.zeros_like(points)
-    for k, (point, size) in enumerate(zip(points, sizes, strict=True)):
+    centres = np.zeros((len(sizes), 2))
+    for k, (point, size) in enumerate(zip(points, sizes, strict=False)):
         half = np.array(size, float) / 2
         offered = point + _DIRECTIONS * (half + gap * np.where(_DIRECTIONS.all(axis=1), 0.5, 1.0)[:, None])
         offered = np.clip(offered, np.array(bounds[:2]) + half, np.array(bounds[2:]) - half)

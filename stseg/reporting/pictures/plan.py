@@ -50,32 +50,31 @@ def plan_view(
         Names of tracks by id, which then stand instead of their ids.
     """
     plan = plan_map(rig, width, height)
-    canvas = ground_sheet(plan, rig, coverage, title or rig.name)
+    canvas, taken = ground_sheet(plan, rig, coverage, title or rig.name)
     _draw_tracks(canvas, plan, trajectory)
     if truth is not None:
         for _, path in _paths(truth):
             dashes(canvas, plan.pixel(path), _TRUTH_COLOUR)
-    _label_tracks(canvas, plan, trajectory, names)
+    _label_tracks(canvas, plan, trajectory, names, taken)
     _legend(canvas, plan, None if coverage is None else int(coverage.max()), truth is not None)
     return canvas
 
 
-def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) -> Bytes:
-    """The ground without tracks: coverage (see `plan_view`), grid lines, border and cameras."""
+def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) -> tuple[Bytes, Floats]:
+    """The ground without tracks: coverage (see `plan_view`), and what `draw_ground` draws and returns."""
     canvas = sheet(plan, title)
     if coverage is not None:
         _shade(canvas, plan, rig.grid, coverage)
-    draw_ground(canvas, plan, rig)
-    return canvas
+    return canvas, draw_ground(canvas, plan, rig)
 
 
-def draw_ground(canvas: Bytes, plan: PlanMap, rig: Rig) -> None:
-    """Grid lines, the border of the area of interest, and cameras."""
+def draw_ground(canvas: Bytes, plan: PlanMap, rig: Rig) -> Floats:
+    """Grid lines, the border of the area of interest, and cameras; returns pixels of their names, float64 (n, 2)."""
     (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
     corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] if rig.grid.polygon is None else rig.grid.polygon
     rule(canvas, plan)
     outline(canvas, plan.pixel(np.asarray(corners, float)), mixed(INK, PAPER, 0.35), 2)
-    _draw_cameras(canvas, plan, rig.cameras)
+    return _draw_cameras(canvas, plan, rig.cameras)
 
 
 def plan_map(rig: Rig, width: int = 1400, height: int = 1500, least_width: int = LEGEND_WIDTH) -> PlanMap:
@@ -101,8 +100,8 @@ def _tone(count: int, most: int) -> Colour:
     return mixed(_UNSEEN_TONE, (252, 251, 250), count / most)
 
 
-def _draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
-    """Every camera, and its name behind it, below the names that are there already."""
+def _draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> Floats:
+    """Every camera, and its name behind it, below the names that are there already; returns pixels of names (n, 2)."""
     named: list[tuple[float, float, int]] = []
     for camera in cameras:
         tone, name, (u, v) = _draw_camera(canvas, plan, camera)
@@ -111,6 +110,8 @@ def _draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> No
             v += 20
         named.append((u, v, width))
         text(canvas, name, (u, v), tone, 15, (0.5, 0.5))
+    along = [np.linspace(u - wide / 2, u + wide / 2, 12) for u, _, wide in named]
+    return np.stack([np.ravel(along), np.repeat([v for _, v, _ in named], 12)], -1)
 
 
 def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, str, tuple[float, float]]:
@@ -210,14 +211,14 @@ def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> Non
     fill(canvas, head, colour)
 
 
-def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str]) -> None:
-    """Ids beside the ends; of many tracks only the longest."""
+def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str], taken: Floats) -> None:
+    """Ids beside the ends, clear of what is taken; of many tracks only the longest."""
     paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:MAX_LABELS]
     size = 14.0 if len(paths) <= 12 else 11.0
     ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
     labels = [names.get(identity, str(identity)) for identity, _ in paths]
     colours = [track_colour(identity) for identity, _ in paths]
-    chips(canvas, ends, labels, colours, size, (*plan.corner, *plan.far_corner), 16)
+    chips(canvas, np.concatenate([ends, taken]), labels, colours, size, (*plan.corner, *plan.far_corner), 16)
 
 
 def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:
