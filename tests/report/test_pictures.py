@@ -166,7 +166,7 @@ def test_labels_stay_on_the_canvas(points: list[tuple[float, float]]) -> None:
     assert (centres >= (15, 8)).all() and (centres <= (385, 292)).all()
 
 
-def test_labels_of_neighbours_cover_neither_each_other_nor_further_points() -> None:
+def test_labels_cover_neither_each_other_nor_points() -> None:
     points = np.array([[200.0, 150.0], [206.0, 150.0], [200.0, 156.0], [220.0, 135.0]])
     centres = place_labels(points, [(30, 16)] * 3, (0, 0, 400, 300))
     distances = np.abs(centres[:, None] - centres[None])

@@ -50,12 +50,12 @@ def plan_view(
         Names of tracks by id, which then stand instead of their ids.
     """
     plan = plan_map(rig, width, height)
-    canvas, taken = ground_sheet(plan, rig, coverage, title or rig.name)
+    canvas, obstacles = ground_sheet(plan, rig, coverage, title or rig.name)
     _draw_tracks(canvas, plan, trajectory)
     if truth is not None:
         for _, path in _paths(truth):
             dashes(canvas, plan.pixel(path), _TRUTH_COLOUR)
-    _label_tracks(canvas, plan, trajectory, names, taken)
+    _label_tracks(canvas, plan, trajectory, names, obstacles)
     _legend(canvas, plan, None if coverage is None else int(coverage.max()), truth is not None)
     return canvas
 
@@ -211,14 +211,14 @@ def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> Non
     fill(canvas, head, colour)
 
 
-def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str], taken: Floats) -> None:
-    """Ids beside the ends, clear of what is taken; of many tracks only the longest."""
+def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str], obstacles: Floats) -> None:
+    """Ids beside the ends, clear of obstacles; of many tracks only the longest."""
     paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:MAX_LABELS]
     size = 14.0 if len(paths) <= 12 else 11.0
     ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
     labels = [names.get(identity, str(identity)) for identity, _ in paths]
     colours = [track_colour(identity) for identity, _ in paths]
-    chips(canvas, np.concatenate([ends, taken]), labels, colours, size, (*plan.corner, *plan.far_corner), 16)
+    chips(canvas, np.concatenate([ends, obstacles]), labels, colours, size, (*plan.corner, *plan.far_corner), 16)
 
 
 def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:
