@@ -100,9 +100,9 @@ def _frames(request: Request, images: Any) -> tuple[dict[Any, int], int | None]:
 
 def _own_number(path: Path, place: str, image: Any) -> int:
     """The frame of a result without an image list: the number that its image id is, or ends with."""
-    if isinstance(image, int):
+    if type(image) is int:
         return image
-    numbers = last_numbers([str(image)])
+    numbers = last_numbers([image]) if isinstance(image, str) else None
     if numbers is None:
         raise FormatError(path, place, f"image_id {image!r}", "a number, or `images` in the rig: the image list")
     return int(numbers[0])

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
-from stseg.errors import FormatError, SourceError
+from stseg.errors import FormatError, SourceError, printable
 from stseg.io.detections.masks import Mask
 from stseg.io.recording.recording import Source
 from stseg.io.untrusted import limits
@@ -103,7 +103,7 @@ class DetectionList:
         mask: Mask | None = None,
     ) -> None:
         """Add a detection: left, top, width, height in pixels; `place` is where it stands in the file."""
-        values = (number(self._path, place, "box", one) for one in box)
+        values = (number(self._path, place, "box", one) for one in ([box] if isinstance(box, str) else box))
         row = (float(frame), *values, number(self._path, place, "score", score))
         if len(row) != len(LEAST_NUMBERS):
             raise FormatError(self._path, place, f"a box of {len(row) - 2} numbers", "4 numbers")
@@ -115,7 +115,7 @@ class DetectionList:
         if not 0 <= row[5] <= 1:
             raise FormatError(self._path, place, f"score {row[5]:g}", "a score of 0..1")
         self._numbers.append(row)
-        self._label.append(label)
+        self._label.append(printable(label[: limits.NAME]))
         self._mask.append(mask)
 
     def add_corners(
@@ -123,8 +123,8 @@ class DetectionList:
         mask: Mask | None = None,
     ) -> None:  # fmt: skip
         """Add a detection by its left, top, right and bottom edges."""
-        if len(corners) != 4:
-            raise FormatError(self._path, place, f"a box of {len(corners)} numbers", "4 numbers")
+        if len(corners) != 4 or isinstance(corners, str):
+            raise FormatError(self._path, place, f"a box {corners!r}"[:100], "4 numbers")
         left, top, right, bottom = (number(self._path, place, "box", one) for one in corners)
         self.add(place, frame, (left, top, right - left, bottom - top), score, label, mask)
 

@@ -198,7 +198,10 @@ def test_any_standard_output_will_do(tmp_path: Path, shell: str, status: tuple[i
     assert len(done.stderr.splitlines()) <= 1
 
 
-def test_no_escape_codes_reach_the_terminal(tmp_path: Path, refusal: Command) -> None:
+def test_no_escape_codes_reach_the_terminal(tmp_path: Path, refusal: Command, stdout: Command) -> None:
+    rig = write_rig(tmp_path)
+    (tmp_path / "boxes.csv").write_text("frame,left,top,width,height,class\n0,1,1,5,9,\x1b[31m\n")
+    assert r"\x1b[31m 1" in stdout("inspect", rig)
     refusal("run", tmp_path / "\x1b[31mred.toml", "-o", tmp_path / "q.h5")
     refusal("run", write_rig(tmp_path, 'name = "cam1"', 'name = "\\u001b[31m"'), "-o", tmp_path / "q.h5")
 
