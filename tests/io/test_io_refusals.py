@@ -63,7 +63,7 @@ def test_unknown_json_is_named(tmp_path: Path, name: str, texts: str) -> None:
         ("x.json", '[{"bboxes":[[1,2,3]],"scores":[1],"labels":[0]}]', {}, r"frame 0: found a box \[1, 2, 3\]"),
         ("x.json", '[[{"box":{"x1":1,"y1":1,"x2":2,"y2":2},"segments":{"x":[1,2,3],"y":[1]}}]]', {}, "of 3 x and 1 y"),
         ("x.json", '[{"image_id":1,"segmentation":{"size":[7,8],"counts":"=331OO10;"}}]', {}, "for an image of 8 x 7"),
-        ("x.json", '[{"image_id":1,"segmentation":{"size":[2,2],"counts":"~"}}]', {}, "a segmentation: run lengths"),
+        ("x.json", '[{"image_id":1,"segmentation":{"size":[2,2],"counts":"~"}}]', {}, "that are not COCO"),
         ("x.json", '[{"image_id":1,"segmentation":[[0,0,1,1]]}]', {}, "a polygon of fewer than 3 points"),
         ("x.json", '[{"image_id":1,"segmentation":[[0,0,1,1,1e9,1]]}]', {}, "a polygon far beyond any image"),
         ("x.json", f'[[{{"box":{{"x1":1}},"segments":{{"x":[1{"0" * 400}],"y":[1]}}}}]]', {}, "detection 0: found x"),
