@@ -214,6 +214,7 @@ def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once at each line of the code that makes a part, writes to it and publishes it, and while the system makes it."""

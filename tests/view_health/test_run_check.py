@@ -88,6 +88,7 @@ def test_a_knock_is_found_with_its_window(side: int) -> None:
     assert knock.after - knock.before == pytest.approx(side * 0.15, abs=0.04)
 
 
+@pytest.mark.slow
 @compiled_only
 def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_recording(tmp_path, 40)
