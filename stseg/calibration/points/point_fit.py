@@ -48,6 +48,8 @@ _NOISE_RATIO = 1.5
 """Greatest ratio of noise variances, pose to free homography, for the pose to be preferred."""
 _GROSS_ERROR = 4.0
 """Median error of the direct linear transform from which on some points are taken for wrong, pixels."""
+_FEW_POINTS = 30
+"""Points up to which two wrong ones can turn the plane over; of more, all pairs would take long."""
 _DIFFERENCE = 1e-3
 """Step of the finite differences on the ground, metres."""
 
@@ -167,7 +169,7 @@ def _robust_homography(ground: Floats, pixel: Floats) -> Floats:
         return float(np.median(np.hypot(*(image[:, :2] / image[:, 2:] - pixel).T)))
 
     whole, rows = fit_homography(ground, pixel), np.arange(len(ground))
-    if error(whole) < _GROSS_ERROR:
+    if error(whole) < _GROSS_ERROR or len(rows) > _FEW_POINTS:
         return whole
     left_out = [pair for count in (1, 2) if len(rows) > MIN_POINTS + count for pair in combinations(rows, count)]
     kept = [np.setdiff1d(rows, pair) for pair in left_out]
