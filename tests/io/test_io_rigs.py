@@ -126,10 +126,13 @@ class TestRefuse:
             ("polygon = [[-2.5, -4.5], ", "polygon = [", "scene.polygon", "2 corners", "3 to"),
             ("[2.5, 1.5]]", "[2.5, 1.5, 3]]", "scene.polygon", "[", "rows of 2 numbers"),
             ("[[-2.5, -4.5], [2.5, -4.5], [2.5, 1.5]]", "[[9, 9], [9, 8], [8, 9]]", "scene.polygon", "no cell", "over"),
+            ("[scene]", f"[scene]\ndoors = [{'[0, 0, 1, 1], ' * 1001}]", "scene.doors", "1001 doors", "at most 1000"),
+            ("[grid]", "[body]\nheight_mean = 1\nheight_spread = 0.9\n[grid]", "body.height_spread", "0.9", "half"),
             ("[grid]", "[gird]", "gird", "unknown key", "did you mean grid?"),
             ("cell = 0.10", "cell = -0.1", "grid.cell", "-0.1", "from 0.001"),
             ("cell = 0.10", "cell = nan", "grid.cell", "nan", "finite"),
             ("cell = 0.10", "cell = 0.001", "grid.cell", "0.001, which makes 5000 x 6000 cells", "at most 20000 along"),
+            ("cell = 0.10", "cell = 0.0035", "grid.cell", "0.0035, which makes 2.4e+07 cells", "at most 2e+07"),
             ("top = 1.80", "top = 0", "grid.top", "0.0", "from 0.001"),
             ("top = 1.80", f"top = 1{'0' * 400}", "grid.top", "1000", "a number"),
             ("planes = 10", "planes = 0", "grid.planes", "0", "from 1"),
@@ -152,9 +155,13 @@ class TestRefuse:
             ('path = "cam1.avi"', 'file = "cam1.avi"', ONE + "source.file", "unknown key", "path"),
             ('kind = "video"', 'kind = "vidoe"', ONE + "source.kind", "'vidoe'", "did you mean video?"),
             ('"cam1.avi"', '"cam1.avi", frames = 3', ONE + "source.frames", "unknown key", "kind, path"),
+            ('"../boxes/cam2.txt"', '["a.txt", "b.txt"]', TWO + "source.path", "2 files", "one file of boxes"),
             ("frames = 263", "frames = 0", TWO + "source.frames", "0", "from 1"),
             ('"blind"', '"blnd"', TWO + "on_missing", "'blnd'", "did you mean blind?"),
             ('d = { kind = "video"', 'd = { kind = "masks"', ONE + "background.kind", "masks", "colour"),
+            ('on_missing = "blind"', 'images = { kind = "masks", path = "a" }', TWO + "images.kind", "'masks'", "vid"),
+            ('on_missing = "blind"', 'images = { kind = "boxes", path = "a" }', TWO + "images.kind", "'boxes'", "vid"),
+            ("offset = -2", 'images = { kind = "video", path = "a" }', ONE + "images.kind", "'video'", "beside a sou"),
             ("[0, 0, 3]]", "[0, 0, 0]]", ONE + "ground", "a singular", ""),
             ("vertical = [-320, -240, -1.0]", "vertical = [0, 0, 0]", ONE + "vertical", "", ""),
             ("[0, 0, -1, 3]]", "[0, 0, -1, 0]]", TWO + "projection", "a singular", ""),
@@ -172,7 +179,8 @@ class TestRefuse:
     def test_no_cameras(self) -> None:
         text = RIG[: RIG.index("[[camera]]")]
         assert refusal(text).key == "camera"
-        assert refusal(f"camera = []\n{text}").expected == "one [[camera]] or more"
+        for value in ("[]", "5", "[5]"):
+            assert refusal(f"camera = {value}\n{text}").expected == "one [[camera]] or more"
 
 
 class TestWrite:

@@ -25,6 +25,8 @@ _OUTLIER_LIMIT = 4.0
 """Outlier threshold, by 1.4826 medians of the distances in the image."""
 _MIN_POINTS = 5
 """Number of points up to which none is rejected."""
+_EVALUATIONS = 100
+"""Most evaluations of a fit: those of real points end within 35, those of mirrored ones would creep for seconds."""
 
 Model = Callable[[Floats], tuple[Floats, Lens | None]]
 """From unknowns to a projection matrix, float64 (3, 4), and the lens."""
@@ -137,9 +139,9 @@ def fit_model(model: Model, start: Floats, points: Points, used: Flags, robust: 
 
     if robust:
         spread = max(1.4826 * float(np.median(np.abs(miss(start)))), CLICK_SPREAD)
-        start = least_squares(miss, start, x_scale="jac", loss="cauchy", f_scale=spread, max_nfev=500).x
+        start = least_squares(miss, start, x_scale="jac", loss="cauchy", f_scale=spread, max_nfev=_EVALUATIONS).x
         used = used & ~outliers(np.hypot(*(project(model, start, points.place) - points.pixel).T), used)
-    found = least_squares(miss, start, x_scale="jac", max_nfev=500)
+    found = least_squares(miss, start, x_scale="jac", max_nfev=_EVALUATIONS)
     jacobian: Floats = np.asarray(found.jac)
     return ModelFit(model, found.x, used, np.asarray(jacobian.T @ jacobian), float(np.sum(found.fun**2)))
 
