@@ -1,12 +1,12 @@
 """Run one experiment: python tools/experiment.py NAME [options], NAME --help for its options.
 
+ablation    what each special case of detection and tracking earns, off one at a time
 compilers   do the ways in which kernels are compiled agree?
 few_views   two and three views of everything: scores, and how many of the points the run takes for wrong
 perturbed   mean and spread of scores over runs with perturbed area, grid, cameras and boxes
 same        do two commits give the same bits?
 scaling     CPU time of a frame over area, views, people and pixels, with exponents
 spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
-targets     scores on the recordings for which least scores are promised
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("compilers", "few_views", "perturbed", "same", "scaling", "spoil", "targets")
+EXPERIMENTS = ("ablation", "compilers", "few_views", "perturbed", "same", "scaling", "spoil")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

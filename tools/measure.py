@@ -8,8 +8,8 @@ perturbed runs share are not scored.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from result_sets import ResultSet
@@ -27,7 +27,6 @@ from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
 from stseg.io.detections.source_detections import appearance_axes
 from stseg.io.recording.frames import open_frames
-from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 
@@ -76,34 +75,41 @@ def _shifted(camera: Camera, angle: float) -> Camera:
     return replace(camera, ground=shift @ camera.ground, vertical=shift @ camera.vertical)
 
 
-def scored_run(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: str = "cut") -> Scores:
-    """Scores of one perturbed run of a set whose inputs are made."""
+class Tracked(NamedTuple):
+    """A perturbed run before its final tracks, and the perturbed rig's pipeline that finds them."""
+
+    pipeline: Pipeline
+    rows: tuple[Rows, Rows, Rows]
+    """Committed TRAJECTORY, EVENT and APPEARANCE rows."""
+
+
+def tracked(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: str = "cut") -> Tracked:
+    """Track a perturbed recording of a set whose inputs are made."""
     recording = read_recording(bench.path(one.rig))
     streams = np.random.SeedSequence(seed).spawn(1 + len(recording.sources))
-    area = scored_area(one, recording.rig)
     recording = replace(recording, rig=perturbed_rig(recording.rig, np.random.default_rng(streams[0])))
     first, stop = map(int, one.frames.split(":"))
-    rows = track(recording, config, tracker, first, stop, streams[1:])
-    assert one.truth is not None
-    truth, frames = read_tracks_csv(bench.path(one.truth)), np.arange(first, stop)
-    flagged = "--ignore-flagged" in shlex.split(one.scoring)
-    return evaluate(truth, rows, area=area, frames=frames, ignore_flagged=flagged)
-
-
-def track(
-    recording: Recording, config: Config, tracker: str, first: int, stop: int, streams: Sequence[np.random.SeedSequence]
-) -> Rows:
-    """The trajectory of a recording of which random boxes or frames are missing."""
     kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
     pipeline = Pipeline(recording.rig, kinds, config, tracker, appearance_axes(recording))
-    pairs = zip(make_foregrounds(recording, config, first, stop), streams, strict=True)
+    pairs = zip(make_foregrounds(recording, config, first, stop), streams[1:], strict=True)
     foregrounds = [Perturbed(whole, np.random.default_rng(stream)) for whole, stream in pairs]
     frames_done: list[int] = []
     with open_frames(recording, first, stop) as frames:
         steps = list(run_session(pipeline, foregrounds, frames, first, frames_done.append))  # type: ignore[arg-type]
     trajectory, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
-    appearance = np.concatenate([step.appearance for step in steps])
-    return pipeline.finished(trajectory, events, appearance)[0].trajectory
+    return Tracked(pipeline, (trajectory, events, np.concatenate([step.appearance for step in steps])))
+
+
+def scored(one: ResultSet, bench: Bench, run: Tracked) -> Scores:
+    """Scores of the final tracks of a perturbed run."""
+    assert one.truth is not None
+    rows = run.pipeline.finished(*run.rows)[0].trajectory
+    area, frames = (
+        scored_area(one, read_recording(bench.path(one.rig)).rig),
+        np.arange(*map(int, one.frames.split(":"))),
+    )
+    flagged = "--ignore-flagged" in shlex.split(one.scoring)
+    return evaluate(read_tracks_csv(bench.path(one.truth)), rows, area=area, frames=frames, ignore_flagged=flagged)
 
 
 def scored_area(one: ResultSet, rig: Rig) -> Area:

@@ -24,6 +24,7 @@ from workbench import ROOT, Bench, command_line, commit
 from stseg.io.runfile.runs import read_run
 
 STORE, PAGE = ROOT / "docs" / "results" / "results.csv", ROOT / "docs" / "development" / "results.md"
+ABLATION = STORE.with_name("ablation.csv")
 SCORES = {
     "MODA": "MODA", "MODP": "MODP", "precision": "precision", "recall": "recall", "MOTA": "MOTA", "IDF1": "IDF1",
     "HOTA": "HOTA", "switches": "IDSW", "fragments": "Frag", "false_tracks": "false_tracks",
@@ -32,7 +33,6 @@ SCORES = {
 COLUMNS = ("set", "variant", "frames", *SCORES, "tracks", "error_m", "commit", "run", "evaluate")
 _OTHERS = ("kalman", "particles", "belief")
 """Baselines that stand beside the trackers on the page."""
-_MARKS = "<!-- table -->", "<!-- end of table -->"
 
 Row = Mapping[str, str]
 
@@ -68,12 +68,11 @@ def publish(rows: Mapping[tuple[str, str], Row]) -> None:
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows[key] for key in sorted(rows))
-    PAGE.write_text(page(PAGE.read_text(encoding="utf-8"), rows), encoding="utf-8")
+    PAGE.write_text(ablation(page(PAGE.read_text(encoding="utf-8"), rows)), encoding="utf-8")
 
 
 def page(text: str, rows: Mapping[tuple[str, str], Row]) -> str:
     """The page with the table of all sets and trackers between its marks."""
-    begin, end = _MARKS
     head = ["set", "input", "frames", "cut", "switches", "error m", "frames only", *_OTHERS]
     lines = [f"| {' | '.join(head)} |", f"|{' --- |' * 3}{' --: |' * (len(head) - 3)}"]
     for one in SETS.values():
@@ -83,8 +82,28 @@ def page(text: str, rows: Mapping[tuple[str, str], Row]) -> str:
             others = [_scores(rows.get((one.name, name))) for name in ("frames", *_OTHERS)]
             cells = [_scores(row), row.get("switches") or "-", row.get("error_m") or "-", *others]
             lines.append(f"| {' | '.join([f'`{one.name}`', words, row['frames'], *cells])} |")
+    return _filled(text, "table", lines)
+
+
+def ablation(text: str) -> str:
+    """The page with the table of what mechanisms earn, MODA and IDF1 by mechanism and set, between its marks."""
+    with ABLATION.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    sets = list(dict.fromkeys(row["set"] for row in rows))
+    cells = {(row["mechanism"], row["set"]): f"{row['moda']}; {row['idf1']}" for row in rows}
+    lines = [f"| without | {' | '.join(f'`{name}`' for name in sets)} |", f"| ---{' | --:' * len(sets)} |"]
+    lines += [
+        f"| {mechanism} | {' | '.join(cells.get((mechanism, name), '-') for name in sets)} |"
+        for mechanism in dict.fromkeys(row["mechanism"] for row in rows)
+    ]
+    return _filled(text, "ablation", lines)
+
+
+def _filled(text: str, name: str, lines: Sequence[str]) -> str:
+    """The text with the lines between the marks of a name."""
+    begin, end = f"<!-- {name} -->\n", f"\n<!-- end of {name} -->"
     before, _, rest = text.partition(begin)
-    return f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{rest.partition(end)[2]}"
+    return before + begin + "\n".join(lines) + end + rest.partition(end)[2]
 
 
 def _scores(row: Row | None) -> str:

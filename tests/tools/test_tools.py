@@ -3,7 +3,9 @@
 import json
 import shlex
 import sys
+from operator import itemgetter
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ import datasets  # noqa: E402
 import measure  # noqa: E402
 import pom_rig  # noqa: E402
 import results  # noqa: E402
+from experiments import ablation  # noqa: E402
 from result_sets import SETS, VARIANTS  # noqa: E402
 
 
@@ -75,7 +78,13 @@ def test_the_page_shows_trackers_side_by_side() -> None:
 
 def test_the_committed_page_shows_the_stored_rows() -> None:
     text = results.PAGE.read_text(encoding="utf-8")
-    assert results.page(text, results.stored()) == text
+    assert results.ablation(results.page(text, results.stored())) == text
+
+
+@pytest.mark.parametrize("patched", [*ablation.WHOLE.values(), *ablation.FINAL.values()], ids=itemgetter(0))
+def test_a_mechanism_that_is_taken_away_is_there(patched: tuple[str, object]) -> None:
+    with patch(*patched):
+        pass
 
 
 def test_a_perturbed_rig_is_shifted_as_stated() -> None:

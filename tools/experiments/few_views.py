@@ -22,12 +22,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from workbench import command_line, write_table
 
-from experiments.target_trials import CMC_AREA, Recorded, delivered, filmed
-from experiments.targets import tracked
+from experiments.recordings import Recorded, delivered, filmed
+from stseg import Tracker
 from stseg.arrays import Flags, Rows
 from stseg.evaluation import evaluate
 from stseg.simulation import NAMED
 
+_CMC_AREA = (1.9, -0.3, 6.2, 3.5)
 _VIEWS = (2, 3)
 _GATE = 0.5
 """Distance within which a point is right, metres."""
@@ -51,11 +52,11 @@ def recordings(data: Path, work: Path) -> dict[str, Callable[[int], Recorded]]:
     """The recordings by name; each is made with so many frames."""
     return {
         "uu4": lambda most: delivered(work / "uu4.toml", data / "uu4" / "reference_tracks.csv", most),
-        "cmc2": lambda most: delivered(work / "cmc2.toml", work / "cmc2.csv", most, CMC_AREA),
-        "cmc2, fairmot": lambda most: delivered(work / "cmc2_fairmot.toml", work / "cmc2.csv", most, CMC_AREA),
-        "easy, masks": filmed(NAMED["easy"], "masks"),
+        "cmc2": lambda most: delivered(work / "cmc2.toml", work / "cmc2.csv", most, _CMC_AREA),
+        "cmc2, fairmot": lambda most: delivered(work / "cmc2_fairmot.toml", work / "cmc2.csv", most, _CMC_AREA),
+        "easy, masks": filmed(NAMED["easy"], "mask"),
         "easy, boxes": filmed(NAMED["easy"], "boxes"),
-        "dense4, masks": filmed(NAMED["dense4"], "masks"),
+        "dense4, masks": filmed(NAMED["dense4"], "mask"),
         "wildtrack": lambda most: delivered(work / "wildtrack.toml", work / "wildtrack.csv", most),
     }
 
@@ -69,6 +70,14 @@ def matched(found: Rows, truth: Rows, gate: float) -> Flags:
         i, j = linear_sum_assignment(np.where(distance < gate, distance, 1e3))
         right[rows[j[distance[i, j] < gate]]] = True
     return right
+
+
+def tracked(made: Recorded) -> Rows:
+    """Trajectory of the default tracker."""
+    tracker, results = Tracker(made.rig), []
+    for views in made.frames:
+        results += tracker.add(views)
+    return tracker.tracks(results + tracker.finish()).trajectory
 
 
 def choices(cameras: int, number: int, most: int) -> Iterator[tuple[int, ...]]:
