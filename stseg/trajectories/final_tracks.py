@@ -1,7 +1,7 @@
 """From committed rows to the tracks of the whole run (docs/how-it-works.md, Tracks).
 
-committed rows -> short gaps filled -> global association -> repetitions, short tracks, ghosts dropped -> smoothed
-                  (smoother)           (identities)          (pruning)                                    (smoother)
+committed rows -> short gaps filled -> global association -> short tracks dropped -> smoothed
+                  (smoother)           (identities)          (pruning)               (smoother)
 -> people who come back, where that is wanted
    (returned_tracks)
 
@@ -26,12 +26,9 @@ from stseg.records.border import Border
 from stseg.records.tables import BOX, EVENT
 from stseg.records.track_heights import with_heights
 from stseg.tracking.windows.encounters import encounters
-from stseg.trajectories.pruning import coincident, drop_ghosts, drop_short
+from stseg.trajectories.pruning import drop_short
 from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
 from stseg.trajectories.smoother import fill_gaps, interpolated_rows, smooth_places
-
-_COINCIDENCE_TIME = 1.0
-"""Time in one place from which two tracks are one person, seconds."""
 
 
 @dataclass(frozen=True)
@@ -59,14 +56,12 @@ def final_tracks(
     linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
     named = linked.identity[: len(committed)]
-    repeats, repeated = coincident(bridged, frame_rate, _COINCIDENCE_TIME)
-    unrepeated = ~repeats[: len(committed)]
-    kept, dropped = _kept(bridged[: len(committed)][unrepeated], frame_rate, config.tracking)
-    identity = np.where(np.isin(named, kept) & unrepeated, named, 0)
+    kept, dropped = drop_short(bridged[: len(committed)], frame_rate, config.tracking)
+    identity = np.where(np.isin(named, kept["id"]), named, 0)
     met = _encounters(events, _Names(committed, identity), frame_rate, config.tracking)
     renamed = _renamed(events, _Names(committed, named), linked.links)
-    every_event = np.concatenate([renamed, met, repeated, dropped])
-    tracks = fill_gaps(bridged[np.isin(bridged["id"], kept) & ~repeats], frame_rate, config.tracking, True)
+    every_event = np.concatenate([renamed, met, dropped])
+    tracks = fill_gaps(bridged[np.isin(bridged["id"], kept["id"])], frame_rate, config.tracking, True)
     smoothed = smooth_places(tracks, frame_rate, config.motion)
     whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
     least = config.tracking.return_probability
@@ -75,13 +70,6 @@ def final_tracks(
     whole = _with_later_ids(whole, int(known_people["id"].max(initial=0)))
     returns = returns_of(problem, whole.identity, bridged, least, constraints, known_people)
     return _with_returns(whole, returns, frame_rate)
-
-
-def _kept(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Ints, Rows]:
-    """Ids of the tracks that are neither short nor ghosts, and an event for each of the others."""
-    long, short = drop_short(trajectory, frame_rate, config)
-    kept, ghosts = drop_ghosts(long, frame_rate, config)
-    return np.unique(kept["id"]), np.concatenate([short, ghosts])
 
 
 def _with_later_ids(whole: FinalTracks, last_id: int) -> FinalTracks:

@@ -26,7 +26,7 @@ from stseg.tracking.windows.tracklets import Tracklet, form_tracklets
 from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
 from stseg.tracking.windows.windows import LONGEST, SHORTEST, Window, window_length, windows
 from stseg.trajectories.final_tracks import box_rows
-from stseg.trajectories.pruning import drop_ghosts, drop_short
+from stseg.trajectories.pruning import drop_short
 from stseg.trajectories.smoother import fill_gaps
 
 RATE = 8.0
@@ -351,20 +351,6 @@ def test_short_tracks_go_with_an_event() -> None:
     assert [(e["frame"], e["kind"], e["id"], e["other"]) for e in events] == [(7, b"dropped", 2, 0)]
     assert events["reason"][0]
     empty, none = drop_short(rows[:0], RATE, CONFIG)
-    assert len(empty) == len(none) == 0
-
-
-def test_tracks_that_most_frames_doubt_go_with_an_event() -> None:
-    """A frame of a short gap says ghost; of a long one nobody knows, so it says nothing."""
-    long = round(CONFIG.interpolation_gap * RATE) + 1
-    seen = {1: [0, 1, 4, 6, 9, 10], 2: [0, 3, 6, 9], 3: [*range(4), *range(4 + long, 8 + long)]}
-    rows = rows_of({i: {f: (float(i), 0.0) for f in frames} for i, frames in seen.items()})
-    kept, events = drop_ghosts(rows[::-1], RATE, CONFIG)
-    assert np.unique(kept["id"]).tolist() == [1, 3]  # of the first, 5 frames of 11 do
-    assert [(e["frame"], e["kind"], e["id"], e["reason"]) for e in events] == [
-        (0, b"dropped", 2, b"6 of 10 frames say ghost")
-    ]
-    empty, none = drop_ghosts(rows[:0], RATE, CONFIG)
     assert len(empty) == len(none) == 0
 
 

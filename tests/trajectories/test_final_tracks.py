@@ -1,12 +1,10 @@
-"""The tracks of a whole run: events, dropped tracks, coincident tracks, and smoothed paths."""
+"""The tracks of a whole run: events, dropped tracks, and smoothed paths."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from run_files import table_of
 from scipy.linalg import block_diag
-from scipy.spatial.distance import cdist
 from simulated_people import BORDER, CONFIG, RATE, committed, gone, rows_of, runs, straight, swapped, visit
 from strategies import numbers
 
@@ -16,7 +14,6 @@ from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import APPEARANCE, TRAJECTORY
 from stseg.trackers.rows import event_rows
 from stseg.trajectories.final_tracks import FinalTracks, final_tracks
-from stseg.trajectories.pruning import coincident
 from stseg.trajectories.smoother import smooth_places, smoothed_paths
 
 
@@ -125,49 +122,6 @@ def test_nobody_at_all() -> None:
     found = whole(np.zeros(0, TRAJECTORY), events_of())
     assert len(found.trajectory) == len(found.events) == len(found.identity) == 0
     assert len(smooth_places(np.zeros(0, TRAJECTORY), SMOOTHER_RATE, MOTION)) == 0
-
-
-COINCIDENCE_RATE = 10.0
-
-
-def walk(track: int, first: int, stop: int, y: float, score: float) -> Rows:
-    """A track along x, 0.1 m a frame."""
-    frame = np.arange(first, stop)
-    return table_of(TRAJECTORY, frame=frame, id=track, x=0.1 * frame, y=y, score=score)
-
-
-def test_the_weaker_of_two_coincident_tracks_is_dropped() -> None:
-    rows = np.concatenate([walk(1, 0, 60, 0.0, 5.0), walk(2, 20, 45, 0.1, 3.0), walk(3, 0, 60, 0.6, 1.0)])
-    repeats, events = coincident(rows, COINCIDENCE_RATE, 1.0)
-    assert set(rows["id"][repeats]) == {2} and repeats.sum() == 25
-    (event,) = events
-    assert (event["frame"], event["kind"], event["id"], event["other"]) == (20, b"dropped", 2, 1)
-    assert event["reason"] == b"in one place with track 1 for 2.5 s: one person"
-
-
-@pytest.mark.parametrize(("y", "length"), [(0.1, 9), (0.25, 40)])
-def test_brief_encounters_and_neighbours_stay(y: float, length: int) -> None:
-    rows = np.concatenate([walk(1, 0, 60, 0.0, 5.0), walk(2, 20, 20 + length, y, 3.0)])
-    repeats, events = coincident(rows, COINCIDENCE_RATE, 1.0)
-    assert not repeats.any() and not len(events)
-
-
-def test_no_track_and_rows_in_any_order() -> None:
-    assert not len(coincident(np.zeros(0, TRAJECTORY), COINCIDENCE_RATE, 1.0)[0])
-    rows = np.concatenate([walk(2, 0, 30, 0.1, 9.0), walk(1, 0, 30, 0.0, 5.0)])
-    shuffled = rows[np.random.default_rng(1).permutation(len(rows))]
-    repeats, _ = coincident(shuffled, COINCIDENCE_RATE, 1.0)
-    assert set(shuffled["id"][repeats]) == {1} and repeats.sum() == 30
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_after_it_no_two_tracks_share_a_place_for_a_second(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    rows = np.concatenate([walk(k, 0, 50, rng.uniform(0, 1), rng.normal()) for k in range(1, 7)])
-    left = rows[~coincident(rows, COINCIDENCE_RATE, 1.0)[0]]
-    places = left[left["frame"] == 25]
-    apart = cdist(places["y"][:, None], places["y"][:, None]) + np.diag(np.full(len(places), np.inf))
-    assert apart.min(initial=np.inf) >= 0.12
 
 
 SMOOTHER_RATE = 8.0

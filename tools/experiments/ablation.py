@@ -60,8 +60,6 @@ FINAL: dict[str, tuple[str, Any]] = {
     "sizes foreseen": (f"{_OBSERVED}.Observations.with_foreseen_sizes", lambda observed: observed),
     "certain rows": (f"{_OBSERVED}._certain", lambda rows, _: np.zeros(len(rows), bool)),
     "births of a second as one": (f"{_OBSERVED}.Observations.birth", lambda observed: np.arange(len(observed.order))),
-    "repetitions dropped": (f"{_FINAL}.coincident", lambda rows, *_: (np.zeros(len(rows), bool), _NO_EVENTS)),
-    "ghosts dropped": (f"{_FINAL}.drop_ghosts", lambda rows, *_: (rows, _NO_EVENTS)),
     "short tracks dropped": (f"{_FINAL}.drop_short", lambda rows, *_: (rows, _NO_EVENTS)),
     "short gaps filled": (f"{_FINAL}.interpolated_rows", lambda rows, *_: rows[:0]),
     "encounters": ("stseg.tracking.row_groups._meetings", lambda rows, _: (rows["id"][:0], rows["frame"][:0])),
