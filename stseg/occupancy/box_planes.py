@@ -142,7 +142,7 @@ def fill_levels(
     heights : float64 (height,), planes : float64 (plane,)
         Metres, rising.
     footprint : int16 (cell, 4)
-        Of the whole volume; see `stseg.geometry.sampling`.
+        In block order; see `stseg.geometry.sampling`.
     """
     ground_cells, first_taller = fit.shape[1], np.searchsorted(heights, planes)
     taller = fit.copy()
@@ -152,7 +152,7 @@ def fill_levels(
     unfit = level_of_match(0.0, rates.miss, rates.clutter), level_of_match(0.0, rates.miss, rates.near_clutter)
     for k in range(len(cells.cell)):
         cell, place, is_near = np.uint64(cells.cell[k]), np.uint64(cells.place[k]), cells.near_person[k] >= 0
-        first = first_taller[cell // np.uint64(ground_cells)]
+        first = first_taller[np.uint64(cells.in_volume[k]) // np.uint64(ground_cells)]
         best = float(taller[first, place]) if first < len(heights) else -np.inf
         if footprint[cell, 2] == 0:
             levels[k] = UNSEEN

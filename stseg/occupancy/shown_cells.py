@@ -8,6 +8,8 @@ bit.
 
 Blocks of cells, not cells, are asked whether something is shown: the box around a block's footprints in each view, by
 the summed-area tables that hold the likelihoods and the people's pixels.
+
+All tables hold the cells that a view sees in *block order*, plane by plane: a block's lie side by side in memory.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import AnyArray, Bytes, Flags, Floats, Ints, Labels
+from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable, sum_of
 from stseg.kernels.accelerate import kernel
@@ -35,8 +37,8 @@ _CODE_VIEWS = 60
 """Number of views with sets that one whole number codes."""
 
 Reach = NDArray[np.int16]
-"""int16 (plane, block row, block column, 4): left, top, right, bottom of the box around a block's footprints, pixels;
-right 0 where the view sees none of its cells."""
+"""int16 (block, 4): left, top, right, bottom of the box around a block's footprints, pixels; right 0 where the view
+sees none of its cells."""
 
 
 class ViewSets(NamedTuple):
@@ -44,8 +46,8 @@ class ViewSets(NamedTuple):
 
     Attributes
     ----------
-    of_cell : int32 (plane, y, x)
-        The set of each cell.
+    of_cell : int32 (cell,)
+        The set of each cell that a view sees, in block order.
     seen_by : bool (set, view)
         The views of each set.
     size : int64 (set,)
@@ -63,9 +65,11 @@ class ShownCells(NamedTuple):
     Attributes
     ----------
     cell : int32 (n,)
-        Index in the flattened volume.
+        Index in block order, of those that a view sees.
     place : int32 (n,)
-        Index in the flattened ground.
+        Index in block order, of all ground cells.
+    in_volume : int32 (n,)
+        Index in the flattened volume.
     block : int32 (b,)
         The blocks that have any, as indices among those of all planes.
     start : int32 (b + 1,)
@@ -80,6 +84,7 @@ class ShownCells(NamedTuple):
 
     cell: Labels
     place: Labels
+    in_volume: Labels
     block: Labels
     start: Labels
     unseen: Levels
@@ -93,6 +98,7 @@ class _MarkedCells(NamedTuple):
     marked: Flags
     cell: Labels
     place: Labels
+    in_volume: Labels
     block: Labels
     start: Labels
     unseen: Levels
@@ -106,62 +112,84 @@ class CellTables:
     ----------
     footprint : int16 (view, plane, y, x, 4)
         See `stseg.geometry.sampling`.
+
+    Attributes
+    ----------
+    ground : int64 (place,), ground_start : int64 (block of one plane,)
+        The ground cells in block order, as indices in the flattened ground, and the first of each block.
+    footprint : int16 (view, cell, 4), place, in_volume : int32 (cell,)
+        Of the cells that a view sees, in block order; see `ShownCells`.
+    reach : of each view
+        See `Reach`.
     """
 
     def __init__(self, footprint: Footprints) -> None:
-        self.footprint = footprint
-        self.reach = [_reach(boxes) for boxes in footprint]
+        self.shape = planes, rows, columns = footprint.shape[1:4]
+        y, x = np.indices((rows, columns)) // BLOCK_SIDE
+        block = (y * columns + x).reshape(-1)
+        self.ground = np.argsort(block, kind="stable")
+        self.ground_start = np.unique(block[self.ground], return_index=True)[1]
+        first = np.arange(planes)[:, None] * len(self.ground)
+        start, order = (first + self.ground_start).reshape(-1), (first + self.ground).reshape(-1)
+        views = footprint.reshape(len(footprint), -1, 4)
+        self.reach = [_reach(boxes[order], start) for boxes in views]
+        is_seen = np.logical_or.reduce(views[..., 2] > 0)[order]
+        self.in_volume, place = order[is_seen].astype(np.int32), np.flatnonzero(is_seen) % len(self.ground)
+        self.footprint, self.place = views.take(self.in_volume, 1), place.astype(np.int32)
+        self._width = np.add.reduceat(is_seen, start, dtype=np.int64)  # cells of each block
         self._cells: _MarkedCells | None = None
 
     @cached_property
     def sets(self) -> ViewSets:
-        """The sets of views that occur."""
-        shape = self.footprint.shape[1:4]
-        code = np.zeros(shape, np.int64)
+        """The sets of views that occur, but for none."""
+        code = np.zeros(len(self.in_volume), np.int64)
         for k, boxes in enumerate(self.footprint):
             if k and k % _CODE_VIEWS == 0:
-                code = np.unique(code, return_inverse=True)[1].reshape(shape)
-            code += code + (boxes[..., 2] > 0)
+                code = np.unique(code, return_inverse=True)[1]
+            code += code + (boxes[:, 2] > 0)
         _, example, of_cell, size = np.unique(code, return_index=True, return_inverse=True, return_counts=True)
-        seen_by = self.footprint.reshape(len(self.footprint), -1, 4)[:, example, 2] > 0
-        return ViewSets(of_cell.reshape(shape).astype(np.int32), np.ascontiguousarray(seen_by.T), size.astype(np.int64))
+        return ViewSets(of_cell.astype(np.int32), (self.footprint[:, example, 2] > 0).T.copy(), size.astype(np.int64))
+
+    @cached_property
+    def set_of_cell(self) -> Labels:
+        """The set of views of each cell, int32 (plane, y, x): one behind the last where no view sees it."""
+        of_cell = np.full(self.shape, len(self.sets.size), np.int32)
+        of_cell.reshape(-1)[self.in_volume] = self.sets.of_cell
+        return of_cell
 
     def nothing_marked(self) -> Flags:
-        """No block marked, bool (plane, block row, block column)."""
-        return np.zeros(self.reach[0].shape[:3], bool)
+        """No block marked, bool (block,)."""
+        return np.zeros(len(self._width), bool)
 
-    def cells_at(self, marked: Flags, near_person: Ints, views: Bytes) -> ShownCells:
+    def cells_at(self, marked: Flags, near_person: Ints) -> ShownCells:
         """The cells of the marked blocks, as far as a view sees them.
 
         Parameters
         ----------
-        marked : bool (plane, block row, block column)
+        marked : bool (block,)
             Blocks at which a view shows something, or near a person.
-        near_person : int64 (y, x)
-            The person near each cell, -1 for none.
-        views : uint8 (plane, y, x)
-            Number of views that see each cell.
+        near_person : int64 (place,)
+            The person near each ground cell, -1 for none.
         """
         if marked.mean() > _NEARLY_ALL:
             marked = np.ones_like(marked)
         if self._cells is None or not np.array_equal(marked, self._cells.marked):
-            self._cells = self._cells_of(marked, views)
-        _, cell, place, block, start, unseen, number = self._cells
+            self._cells = self._cells_of(marked)
+        _, cell, place, in_volume, block, start, unseen, number = self._cells
         person = np.full(len(number), -1, np.int32)
-        nearest = near_person.reshape(-1).astype(np.int32)
-        np.take(nearest, place, out=person[: len(place)], mode="clip")  # no copy of `out`
-        return ShownCells(cell, place, block, start, unseen, person, number)
+        np.take(near_person.astype(np.int32), place, out=person[: len(place)], mode="clip")  # no copy of `out`
+        return ShownCells(cell, place, in_volume, block, start, unseen, person, number)
 
-    def _cells_of(self, marked: Flags, views: Bytes) -> _MarkedCells:
-        sets, most = self.sets, int(marked.sum()) * BLOCK_SIDE**2
-        cell, place, block, view_set = np.empty((4, most), np.int32)
-        others = sets.size.copy()
-        count = _fill_cells(marked, views, sets.of_cell, cell, place, block, view_set, others)
-        start = np.append(np.flatnonzero(np.diff(block[:count], prepend=-1)), count).astype(np.int32)
-        seen_by = np.concatenate([sets.seen_by[view_set[:count]], sets.seen_by])
+    def _cells_of(self, marked: Flags) -> _MarkedCells:
+        cell = np.flatnonzero(np.repeat(marked, self._width)).astype(np.int32)
+        block = np.flatnonzero(marked & (self._width > 0)).astype(np.int32)
+        start = np.append(0, self._width[block].cumsum()).astype(np.int32)
+        sets, of_cell = self.sets, self.sets.of_cell[cell]
+        others = sets.size - np.bincount(of_cell, minlength=len(sets.size))
+        seen_by = np.concatenate([sets.seen_by[of_cell], sets.seen_by])
         unseen = np.where(np.ascontiguousarray(seen_by.T), np.int16(0), np.int16(UNSEEN))
-        number = np.concatenate([_cell_numbers(count), others])
-        return _MarkedCells(marked.copy(), cell[:count], place[:count], block[start[:-1]], start, unseen, number)
+        number = np.concatenate([_cell_numbers(len(cell)), others])
+        return _MarkedCells(marked.copy(), cell, self.place[cell], self.in_volume[cell], block, start, unseen, number)
 
 
 def _cell_numbers(count: int) -> Floats:
@@ -173,60 +201,20 @@ def _cell_numbers(count: int) -> Floats:
 
 @kernel
 def mark_map(reach: Reach, table: SumTable, marked: Flags) -> None:
-    """Mark the blocks (plane, row, column) with a level of a view's map above its lowest in their boxes."""
-    for z in range(marked.shape[0]):
-        for j in range(marked.shape[1]):
-            for i in range(marked.shape[2]):
-                left, top, right, bottom = reach[z, j, i]
-                if right > 0 and not marked[z, j, i]:
-                    pixels = (np.int64(right) - left) * (np.int64(bottom) - top)
-                    u, v = left - table.left, top - table.top
-                    total = sum_of(table.sums, u, v, right - table.left, bottom - table.top)
-                    marked[z, j, i] = pixels > _MOST_PIXELS or total != table.lowest * pixels
+    """Mark the blocks (block,) with a level of a view's map above its lowest in their boxes."""
+    for b in range(len(marked)):
+        left, top, right, bottom = reach[b]
+        if right > 0 and not marked[b]:
+            pixels = (np.int64(right) - left) * (np.int64(bottom) - top)
+            u, v = left - table.left, top - table.top
+            total = sum_of(table.sums, u, v, right - table.left, bottom - table.top)
+            marked[b] = pixels > _MOST_PIXELS or total != table.lowest * pixels
 
 
-def blocks_of(values: AnyArray, reduced: np.ufunc) -> AnyArray:
-    """Values of cells (plane, y, x, ...) reduced over blocks, (plane, block row, block column, ...)."""
-    rows, columns = (np.arange(0, side, BLOCK_SIDE) for side in values.shape[1:3])
-    return np.asarray(reduced.reduceat(reduced.reduceat(values, rows, 1), columns, 2))
-
-
-def _reach(footprint: Footprints) -> Reach:
-    """The boxes around the footprints (plane, y, x, 4) of a view's blocks."""
-    first, extent = footprint[..., :2], footprint[..., 2:]
-    visible = extent[..., :1] > 0
-    low = blocks_of(np.where(visible, first, np.iinfo(np.int16).max), np.minimum)
-    high = blocks_of(np.where(visible, first + extent, 0), np.maximum)
-    return np.where(high[..., :1] > 0, np.concatenate([low, high], -1), 0).astype(np.int16)
-
-
-@kernel
-def _fill_cells(
-    marked: Flags,
-    views: Bytes,
-    of_cell: Labels,
-    cell: Labels,
-    place: Labels,
-    block: Labels,
-    view_set: Labels,
-    others: Ints,
-) -> int:
-    """Fill cell, place, block and view_set (n,) of the cells of marked blocks that a view sees; their number.
-
-    They are taken from the number of cells of each set, others (set,).
-    """
-    planes, rows, columns = views.shape
-    count = 0
-    for z in range(planes):
-        for j in range(marked.shape[1]):
-            for i in range(marked.shape[2]):
-                if marked[z, j, i]:
-                    for y in range(j * BLOCK_SIDE, min((j + 1) * BLOCK_SIDE, rows)):
-                        for x in range(i * BLOCK_SIDE, min((i + 1) * BLOCK_SIDE, columns)):
-                            if views[z, y, x] > 0:
-                                cell[count], place[count] = (z * rows + y) * columns + x, y * columns + x
-                                block[count] = (z * marked.shape[1] + j) * marked.shape[2] + i
-                                view_set[count] = of_cell[z, y, x]
-                                others[of_cell[z, y, x]] -= 1
-                                count += 1
-    return count
+def _reach(footprint: Footprints, start: Ints) -> Reach:
+    """The boxes around the footprints (cell, 4) of a view's blocks, whose first cells are start (block,)."""
+    first, extent = footprint[:, :2], footprint[:, 2:]
+    visible = extent[:, :1] > 0
+    low = np.minimum.reduceat(np.where(visible, first, np.iinfo(np.int16).max), start)
+    high = np.maximum.reduceat(np.where(visible, first + extent, 0), start)
+    return np.where(high[:, :1] > 0, np.concatenate([low, high], -1), 0).astype(np.int16)

@@ -115,13 +115,11 @@ def _others_inside(
 
 @kernel
 def mark_people(reach: Reach, assigned: PixelAssignment, marked: Flags) -> None:
-    """Mark the blocks (plane, row, column) with a person of a view in their boxes."""
-    for z in range(marked.shape[0]):
-        for j in range(marked.shape[1]):
-            for i in range(marked.shape[2]):
-                left, top, right, bottom = reach[z, j, i]
-                if right > 0 and not marked[z, j, i]:
-                    marked[z, j, i] = _shows_a_person(assigned, left, top, right - left, bottom - top)
+    """Mark the blocks (block,) with a person of a view in their boxes."""
+    for b in range(len(marked)):
+        left, top, right, bottom = reach[b]
+        if right > 0 and not marked[b]:
+            marked[b] = _shows_a_person(assigned, left, top, right - left, bottom - top)
 
 
 @kernel
@@ -140,9 +138,9 @@ def fill_share(
     marked : bool (block,)
         Blocks at which the view shows something.
     footprint : int16 (cell, 4)
-        Of the whole volume.
+        In block order.
     distance : float32 (place,)
-        Of each ground cell from the camera along the ground, metres.
+        In block order, of each ground cell from the camera along the ground, metres.
     """
     for b in range(len(cells.start) - 1):
         if not marked[cells.block[b]]:

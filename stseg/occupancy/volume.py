@@ -23,7 +23,7 @@ from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 from stseg.occupancy.revision import NEAR_PRIOR, cell_prior_log_odds
-from stseg.occupancy.shown_cells import CellTables, ShownCells, blocks_of, mark_map
+from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_share, mark_people
 from stseg.records.people import Explanation
 from stseg.records.sparse_volume import SparseVolume
@@ -43,7 +43,7 @@ class _PreparedView(NamedTuple):
 
 
 class _Fused(NamedTuple):
-    """The cells of a frame, the person near each ground cell, the views' terms, and their sums."""
+    """The cells of a frame, the person near each ground cell in block order, the views' terms, and their sums."""
 
     cells: ShownCells
     near_person: Ints
@@ -64,16 +64,18 @@ class Occupancy:
         rates: ErrorRateConfig | None = None,
     ) -> None:
         self.rig, self.config = rig, config
-        self.sampling = Sampling.of(rig, config.sampling)
-        self.views: Bytes = self.sampling.views()
+        sampling = Sampling.of(rig, config.sampling)
+        self.views: Bytes = sampling.views()
         self.heights = np.asarray(body.heights)
         self.height_mean, self.height_spread = body.height_mean, body.height_spread
         self.prior = cell_prior_log_odds(config)
-        self._sums = [SumTable.over(region) for region in self.sampling.regions()]
-        self._tables = CellTables(self.sampling.footprint)
+        self._sums = [SumTable.over(region) for region in sampling.regions()]
+        self._tables = CellTables(sampling.footprint)
+        order = self._tables.ground
+        self._ground = rig.grid.ground.reshape(-1, 2).take(order, 0)
+        self._distance = sampling.distance.reshape(len(kinds), -1).take(order, 1)
         self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]
         self._first_rates = [_first_rates(kind, detection) for kind in kinds]
-        self._ground = rig.grid.ground
         self._rate_config = rates or ErrorRateConfig()
 
     def new_error_rates(self) -> ErrorRateEstimate:
@@ -130,7 +132,7 @@ class Occupancy:
         ]
         marked = [self._marked(i, view) for i, view in enumerate(views)]
         marked_blocks = np.logical_or.reduce([self._near_people(views, near_person), *marked])
-        cells = self._tables.cells_at(marked_blocks, near_person, self.views)
+        cells = self._tables.cells_at(marked_blocks, near_person)
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(evidence)]))
         terms = self._terms(views, marked, cells, explanation, rates, weights.astype(np.float32))
         return _Fused(cells, near_person, terms, Sums.of(terms))
@@ -158,8 +160,8 @@ class Occupancy:
         columns = near_person >= 0
         for view in views:
             if view is not None and view.fit is not None:
-                columns |= (view.fit > -np.inf).any(0).reshape(columns.shape)
-        return np.broadcast_to(blocks_of(columns[None], np.logical_or), self._tables.reach[0].shape[:3])
+                columns |= (view.fit > -np.inf).any(0)
+        return np.tile(np.logical_or.reduceat(columns, self._tables.ground_start), self.rig.grid.planes)
 
     def _terms(
         self,
@@ -184,7 +186,7 @@ class Occupancy:
                 missing = np.where(view.assignment.separate[:-1], 1.0, explanation.people.visibility[i])
                 confidence[i] = missing.astype(np.float32)
             np.bitwise_or(cells.unseen[i], np.int16(empty), out=levels[i])  # all bits of UNSEEN are set
-            self._fill_view(i, view, marked[i].reshape(-1), cells, rates[i], levels[i], share[i])
+            self._fill_view(i, view, marked[i], cells, rates[i], levels[i], share[i])
         terms = np.stack([log_odds_terms(one) for one in rates])
         return FrameTerms(levels, share, cells.near_person, terms, weights, confidence)
 
@@ -199,7 +201,7 @@ class Occupancy:
         share: Singles,
     ) -> None:
         """Fill levels and share (n + k,), the empty level and 1 before, of a view at the cells fused one by one."""
-        footprint, distance = self.sampling.footprint[i].reshape(-1, 4), self.sampling.distance[i].reshape(-1)
+        footprint, distance = self._tables.footprint[i], self._distance[i]
         if view.table is not None:
             fill_map(cells, marked, footprint, view.table, view.assignment, distance, levels, share)
         elif view.fit is not None:
@@ -208,17 +210,19 @@ class Occupancy:
             fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels)
 
     def _volume(self, fused: _Fused) -> SparseVolume:
-        cell, sets = fused.cells.cell, self._tables.sets
+        number = len(fused.cells.in_volume)
         total = fused.sums.total(fused.cells.near_person, self.config.effective_observations, (self.prior, NEAR_PRIOR))
-        empty = np.where(sets.seen_by.any(1), total[len(cell) :], np.float32(np.nan))
-        return SparseVolume(sets.of_cell, empty, cell, total[: len(cell)])
+        empty = np.append(total[number:], np.float32(np.nan))
+        return SparseVolume(self._tables.set_of_cell, empty, fused.cells.in_volume, total[:number])
 
     def _learn(self, estimate: ErrorRateEstimate, fused: _Fused, explanation: Explanation) -> None:
         people, grid, cells, config = explanation.people, self.rig.grid, fused.cells, estimate.config
         near_cells = np.flatnonzero(cells.near_person >= 0)
-        filled = inside_bodies(grid, fused.near_person, people.ground, people.height)
+        near_person = np.empty(grid.shape[1:], np.int64)
+        near_person.reshape(-1)[self._tables.ground] = fused.near_person
+        filled = inside_bodies(grid, near_person, people.ground, people.height)
         inside = np.zeros(len(cells.near_person), bool)
-        inside[near_cells] = filled.reshape(-1)[cells.cell[near_cells]]
+        inside[near_cells] = filled.reshape(-1)[cells.in_volume[near_cells]]
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
         trials, errors = counts = np.empty((2, len(fused.terms.weight), 3))
         trusted = (people.evidence - people.view_evidence >= config.minimum_evidence) & (
@@ -250,7 +254,7 @@ class Occupancy:
     def _pillars_of(self, i: int) -> tuple[Singles, PillarIndex]:
         """Boxes of the pillars of all heights at all cells, float32 (height * cell, 4), and their index."""
         camera, grid = self.rig.cameras[i], self.rig.grid
-        bodies = BodyTable.of(camera, grid).boxes(grid.ground.reshape(-1, 2), self.heights)
+        bodies = BodyTable.of(camera, grid).boxes(self._ground, self.heights)
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 

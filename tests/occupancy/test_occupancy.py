@@ -22,7 +22,7 @@ from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
-from stseg.occupancy.shown_cells import BLOCK_SIDE, CellTables, ShownCells
+from stseg.occupancy.shown_cells import CellTables, ShownCells
 from stseg.occupancy.volume import Occupancy
 from stseg.records.people import Explanation
 
@@ -148,7 +148,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     every = np.arange(levels.size, dtype=np.int32)
     person = np.tile(near_person.ravel(), 4).astype(np.int32)
     unseen = np.zeros((1, levels.size), np.int16)
-    listed = ShownCells(every, every % 16, every, every, unseen, person, np.ones(levels.size))
+    listed = ShownCells(every, every % 16, every, every, every, unseen, person, np.ones(levels.size))
     fill_levels(fit, tried, grid.heights, listed, footprint.reshape(-1, 4), rates, levels.reshape(-1))
     for cell, (y, x) in enumerate(np.ndindex(4, 4)):
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near_person[y, x])]
@@ -248,7 +248,7 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
     some, every = occupancy.new_error_rates(), occupancy.new_error_rates()
     sparse = occupancy.fuse_and_learn(some, seen, explanation)
     assert 0 < len(sparse.cell) < 0.8 * sparse.of_cell.size
-    monkeypatch.setattr(CellTables, "nothing_marked", lambda self: np.ones(self.reach[0].shape[:3], bool))
+    monkeypatch.setattr(CellTables, "nothing_marked", lambda self: np.ones(len(self.reach[0]), bool))
     whole = occupancy.fuse_and_learn(every, seen, explanation)
     assert len(whole.cell) == (occupancy.views > 0).sum()
     np.testing.assert_array_equal(sparse.dense(), whole.dense())
@@ -326,14 +326,15 @@ def test_the_same_frame_twice() -> None:
 
 
 def test_cells_kept_from_the_frame_before_are_those_of_this_one() -> None:
-    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
-    kept, marked = CellTables(occupancy.sampling.footprint), occupancy.views[:, ::BLOCK_SIDE, ::BLOCK_SIDE] < 0
+    footprint = Sampling.of(COARSE, "footprint").footprint
+    kept = CellTables(footprint)
+    marked = kept.nothing_marked()
     assert marked.size > 1
     for block in (0, 0, -1, 0):
         marked[:] = False
-        marked.reshape(-1)[block] = True  # in place: what is kept is no view of it
-        near_person = np.full(COARSE.grid.shape[1:], block)
-        fresh = CellTables(occupancy.sampling.footprint).cells_at(marked, near_person, occupancy.views)
+        marked[block] = True  # in place: what is kept is no view of it
+        near_person = np.full(COARSE.grid.shape[1:], block).reshape(-1)
+        fresh = CellTables(footprint).cells_at(marked, near_person)
         assert len(fresh.cell)
-        for own, other in zip(kept.cells_at(marked, near_person, occupancy.views), fresh, strict=True):
+        for own, other in zip(kept.cells_at(marked, near_person), fresh, strict=True):
             np.testing.assert_array_equal(own, other)
