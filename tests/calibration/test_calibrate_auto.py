@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 from simulated_people import Walking, changed, delayed, walking
+from strategies import examples
 
 from stseg.arrays import Floats, Singles
 from stseg.calibration.adjusted_rig import cameras_of, centred, grid_of, offsets_of, reports_of, scaled
@@ -51,7 +52,7 @@ def pixels(view: Floats, points: Floats) -> Floats:
 SPOTS = np.array([[0.0, 0.0, 0.0], [1.5, 0.5, 1.7], [-1.0, 1.0, 0.9], [0.3, -1.0, 1.7]])
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(st.floats(0.5, 1.5), st.floats(0.15, 0.7), st.floats(-0.1, 0.1), st.floats(-0.35, 0.1))
 def test_a_pinhole_shows_what_its_camera_shows(focal: float, pitch: float, roll: float, k1: float) -> None:
     view = a_view(focal, pitch, roll, k1)
@@ -59,7 +60,7 @@ def test_a_pinhole_shows_what_its_camera_shows(focal: float, pitch: float, roll:
     np.testing.assert_allclose(pixels(view, SPOTS), projected, atol=1e-6)
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(st.floats(-3, 3), st.floats(0.5, 2.0))
 def test_a_moved_camera_shows_the_moved_world_as_before(turn: float, scale: float) -> None:
     view = a_view()
@@ -279,6 +280,7 @@ def film(path: Path, endpoints: Endpoints, frames: int) -> None:
     writer.release()
 
 
+@pytest.mark.slow
 def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = walking(2, 2, 20.0)
     videos = [tmp_path / "a.avi", tmp_path / "b.avi"]

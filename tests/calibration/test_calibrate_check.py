@@ -36,6 +36,7 @@ from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig
 from stseg.tasks.warnings import explained_by_swap
 
+slow = pytest.mark.slow
 RIG = ring()
 WALK = walkers(40)
 SHOWN = shown(RIG, WALK)
@@ -86,7 +87,11 @@ class TestVerdict:
         assert words.startswith("the views agree: none is off by more than a cell (10 cm)")
 
     @pytest.mark.parametrize(
-        ("view", "kind", "amount"), [(0, "x", 0.4), (1, "y", -0.4), (2, "u", 30.0), (1, "z", 0.25), (0, "yaw", 14.0)]
+        ("view", "kind", "amount"),
+        [
+            (1, "z", 0.25),
+            *(pytest.param(*one, marks=slow) for one in ((0, "x", 0.4), (1, "y", -0.4), (0, "yaw", 14.0))),
+        ],
     )
     def test_the_camera_that_is_off_is_named(self, view: int, kind: str, amount: float) -> None:
         check, words = judged(moved(RIG, view, kind, amount))
@@ -97,10 +102,12 @@ class TestVerdict:
     def test_by_how_much(self) -> None:
         check, words = judged(moved(RIG, 2, "u", 30.0))
         (view,) = check.verdict.named
+        assert view.view == 2 and not check.delays and check.swapped is None
         assert view.pixels == pytest.approx(30.0, rel=0.2)
         assert view.right < -0.2, "the rig says further right, so people show to the left"
         assert "to the left" in words[0] and " px" in words[0]
 
+    @slow
     def test_two_that_are_off_are_named(self) -> None:
         rig = ring(6)
         boxes = shown(rig, WALK[:30])
@@ -121,14 +128,14 @@ class TestVerdict:
 
 
 class TestBlunders:
-    @pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 3)])
+    @pytest.mark.parametrize(("first", "second"), [(1, 3), pytest.param(0, 1, marks=slow)])
     def test_swapped_streams_are_named(self, first: int, second: int) -> None:
         check, words = judged(exchanged(RIG, first, second))
         assert check.swapped == (first, second)
         pair = f"cam{first + 1} and cam{second + 1}"
         assert words[0] == f"{pair} seem to be swapped: their frames fit far better the other way round"
 
-    @pytest.mark.parametrize(("view", "frames"), [(0, 2), (2, -3)])
+    @pytest.mark.parametrize(("view", "frames"), [(2, -3), pytest.param(0, 2, marks=slow)])
     def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
         nothing = [np.zeros((0, 4))] * 4
         boxes = {frame: list(views) for frame, views in SHOWN.items()}

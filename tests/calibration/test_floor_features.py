@@ -58,6 +58,7 @@ def test_a_bare_floor_has_no_marks(cameras: tuple[Camera, ...]) -> None:
     assert len(floor_marks(bare, cameras, GRID)) == 0
 
 
+@pytest.mark.slow
 def test_marks_bring_cameras_nearer_to_the_truth() -> None:
     scene = walking(2, 2, 12.0, noise=2.0)
     single_cameras = single_view_cameras(scene.views, lambda: None)

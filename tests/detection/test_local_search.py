@@ -10,6 +10,7 @@ import pytest
 import reference_core as reference
 from crafted_frames import in_rooms, random_frame
 from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, people, room
+from strategies import examples
 
 from stseg.arrays import Boxes, Floats, Ints, Singles, ViewEvidence
 from stseg.bodies.outlines import outlines
@@ -32,7 +33,7 @@ from stseg.records.predicted_tracks import PredictedTracks
 
 
 @pytest.mark.parametrize("tracks", [0, 4])
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(examples(40)))
 def test_no_single_move_helps(seed: int, tracks: int) -> None:
     frame = random_frame(seed, 10, tracks)
     start = [] if seed % 2 else [0, 3]
@@ -50,7 +51,7 @@ def test_no_single_move_helps(seed: int, tracks: int) -> None:
 
 
 @pytest.mark.parametrize("tracks", [0, 3])
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(examples(20)))
 def test_of_few_candidates_the_best_set_is_found(seed: int, tracks: int) -> None:
     frame = random_frame(seed, 7, tracks)
     best = max(frame.score(chosen) for chosen in reference.subsets(7))
@@ -78,7 +79,7 @@ def test_a_search_that_ends_at_its_limit_loses_nothing(limit: int) -> None:
     assert find_best_set(np.arange(11), 3, frame.problem(), 0, 4, GAIN_LIMIT)[1] == 0
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(examples(20)))
 def test_groups_interact_within_and_their_scores_add_up(seed: int) -> None:
     frame = in_rooms(random_frame(seed, 9, 2), 3)
     problem = frame.problem()

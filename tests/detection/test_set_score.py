@@ -5,6 +5,7 @@ import pytest
 import reference_core as reference
 from crafted_frames import PARAMETERS, CraftedFrame, in_rooms, random_frame, scaled
 from scipy.optimize import linear_sum_assignment
+from strategies import examples
 
 from stseg.arrays import Floats, Ints
 from stseg.bodies.outlines import paint_outlines
@@ -17,7 +18,7 @@ from stseg.kernels.pointed_tuples import pointed
 
 
 @pytest.mark.parametrize("tracks", [0, 3])
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(examples(40)))
 def test_score_by_definition(seed: int, tracks: int) -> None:
     frame = scaled(random_frame(seed, 6, tracks))
     rng = np.random.default_rng(seed)
@@ -35,7 +36,7 @@ def additions(frame: CraftedFrame, members: Ints, candidates: Ints) -> tuple[Flo
     return gains, evidence, boxes, tracks
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(examples(20)))
 def test_candidates_add_what_larger_sets_score_more(seed: int) -> None:
     """Each has the evidence, box and track that it has as a member."""
     frame, members, candidates = scaled(random_frame(seed, 8, 3)), np.array([5, 3, 0]), np.arange(8)
@@ -129,7 +130,7 @@ def assert_kept_gains(state: SetState, frame: CraftedFrame) -> int:
 
 
 @pytest.mark.parametrize("tracks", [0, 3])
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(examples(20)))
 def test_gains_are_differences_of_scores(seed: int, tracks: int) -> None:
     """Members come and go, one in place of another, and back: the gains that are kept are those of the plain score."""
     frame = scaled(in_rooms(random_frame(seed, 8, tracks), 4) if seed % 2 else random_frame(seed, 8, tracks))
@@ -162,7 +163,7 @@ def test_gains_are_differences_of_scores(seed: int, tracks: int) -> None:
     assert (state.problem.owner == -1).all()
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(examples(20)))
 def test_tracks_assigned_one_by_one_have_the_greatest_sum(seed: int) -> None:
     rng = np.random.default_rng(seed)
     gains, birth_cost = rng.normal(-3, 4, (7, 5)), rng.uniform(0, 5, 7)

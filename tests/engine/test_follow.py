@@ -173,6 +173,7 @@ def test_a_run_to_which_nothing_came_leaves_nothing(tmp_path: Path) -> None:
     assert list(output.parent.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2)
@@ -187,6 +188,7 @@ def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
     assert not output.exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, tmp_path: Path) -> None:
     assert live.exists()
     output = tmp_path / "run.h5"
@@ -214,6 +216,7 @@ def test_a_kill_before_its_folder_is_removed_is_mended(
     assert not (tmp_path / "run.h5.segments").exists()
 
 
+@pytest.mark.slow
 def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)

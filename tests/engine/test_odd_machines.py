@@ -60,7 +60,7 @@ def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFix
     ]
 
 
-@pytest.mark.parametrize("code", [errno.ENOLCK, errno.ENOSYS])
+@pytest.mark.parametrize("code", [errno.ENOLCK, pytest.param(errno.ENOSYS, marks=pytest.mark.slow)])
 def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
     rig = write_recording(tmp_path)
     assert track(rig, tmp_path / "locked.h5", "--frames", "0:8") == 0
@@ -94,6 +94,7 @@ def test_too_little_address_space_is_one_line(tmp_path: Path, mebibytes: int) ->
     assert (done.returncode, done.stderr) == (2, said)
 
 
+@pytest.mark.slow
 @LINUX
 def test_a_home_that_cannot_be_written_serves(tmp_path: Path) -> None:
     run = write_small_run(tmp_path / "run.h5")

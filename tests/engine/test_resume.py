@@ -20,6 +20,7 @@ from hypothesis.strategies import integers, sampled_from
 from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, process, run_words, started, track
 from refusals import Command
 from scenes import walkers
+from strategies import examples
 
 from stseg.config import Config
 from stseg.evaluation import evaluate
@@ -58,7 +59,7 @@ def test_a_run_in_segments_follows_everybody(undisturbed: Path) -> None:
     run = read_run(undisturbed)
     scores = evaluate(walkers(FRAMES), run.trajectory)
     assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
-    assert run.frames.tolist() == list(range(FRAMES))
+    assert (run.kept, run.frames.tolist()) == ("all", list(range(FRAMES)))
     assert sorted(path.name for path in undisturbed.parent.iterdir()) == ["run.h5"]
     labels = {int(i) for frame in run.frames.tolist() for i in np.unique(run.read_frame(frame)[1])}
     assert labels == {0, *run.tracks["id"].tolist()}
@@ -230,7 +231,7 @@ def configuration_changed(_folder: Path, chance: random.Random) -> tuple[str, ..
 CHANGES = (cameras_reordered, rig_changed, source_changed, sources_exchanged, configuration_changed)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 @given(change=sampled_from(CHANGES), seed=integers(0, 10**6))
 @example(change=cameras_reordered, seed=1)
 def test_a_resumed_run_is_the_run_or_is_refused(
@@ -294,6 +295,7 @@ def test_a_source_that_vanishes_loses_no_segment(
     assert_same(halfway, undisturbed)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="needs the locks of POSIX systems")
 def test_two_runs_keep_off_one_output(rig_path: Path, night: Path, refusal: Command) -> None:
     running = run_until(rig_path, night, 1)
@@ -336,7 +338,7 @@ def _mount(folder: Path, size: str) -> bool:
     return done.returncode == 0
 
 
-@pytest.mark.parametrize(("volume", "least", "most"), [("none", 1.0, 1.0), ("tracks", 0.1, 0.99), ("all", 0.0, 0.1)])
+@pytest.mark.parametrize(("volume", "least", "most"), [("none", 1.0, 1.0), ("tracks", 0.1, 0.99)])
 def test_the_volume_is_kept_where_it_is_asked_for(
     rig_path: Path, undisturbed: Path, night: Path, volume: str, least: float, most: float
 ) -> None:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from recordings import data_path
 from refusals import refused
 from run_files import table_of
+from strategies import examples
 
 from stseg.arrays import Flags, Ints, Rows
 from stseg.commands.evaluate import evaluate as command
@@ -199,7 +200,7 @@ def test_tables_that_cannot_be_are_refused() -> None:
 
 
 @given(SEEDS)
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 def test_the_slow_definitions_agree(seed: int) -> None:
     truth, tracks = crowd(seed)
     scene, scores = reference.scene_of(truth, tracks), evaluate(truth, tracks)

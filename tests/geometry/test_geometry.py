@@ -298,6 +298,7 @@ def test_frames_are_means_of_squares_and_masks_stay(tmp_path: Path) -> None:
     np.testing.assert_array_equal(masks, picture[:, :, 0])
 
 
+@pytest.mark.slow
 @compiled_only
 def test_boxes_of_a_run_are_in_the_pixels_of_the_images(tmp_path: Path) -> None:
     film = ["simulate", str(tmp_path / "film"), "--scene", "demo", "--seconds", "1.5", "--size", "320,240"]

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulated_people import BORDER, CONFIG, RATE, Path, committed, gone, rows_of, runs, straight, swapped, visit
+from strategies import examples
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally
@@ -71,7 +72,7 @@ def test_too_long_is_somebody_else() -> None:
     np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(runs(6))
 def test_nobody_is_in_two_places_at_once(rows: Rows) -> None:
     found = relinked(rows)
@@ -84,7 +85,7 @@ def test_nobody_is_in_two_places_at_once(rows: Rows) -> None:
         assert (rows["frame"][found.identity == link.identity] < link.frame).any()
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(runs(5), st.integers(0, 999))
 def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(len(rows))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from reference_identities import greatest_score, score
 from refusals import refused
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
+from strategies import examples
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.commands.correct import correct
@@ -44,7 +45,7 @@ def found(seen: Observations, lag: float = 60.0, hypotheses: int = 400) -> Ints:
     return search_identities(seen, MODEL, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag)).name
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(runs(2))
 def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
     with pytest.MonkeyPatch.context() as patch:
@@ -200,7 +201,7 @@ def test_who_was_away_for_long_is_the_same_if_somebody_says_so() -> None:
     assert len(set(identities(near, Constraints.of([], pair)).tolist())) == 2
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(runs(4), st.data())
 def test_whatever_can_be_true_is_obeyed(rows: Rows, data: st.DataObject) -> None:
     """Constraints of any naming in which nobody is twice in a frame."""

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import data_path
 from refusals import refused
+from strategies import examples
 
 from stseg.arrays import Bytes
 from stseg.errors import FormatError, SourceError
@@ -93,7 +94,7 @@ def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
     refused(FormatError, "text file in UTF-8", read_boxes, tmp_path / "binary")
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.lists(st.tuples(st.integers(3, 9), *[st.floats(0, 1e4) for _ in range(4)], st.floats(0, 1)), min_size=1))
 def test_each_box_is_found_in_its_frame_in_the_order_of_the_file(tmp_path: Path, rows: list[tuple[float, ...]]) -> None:
     header = "frame,left,top,width,height,score\n"

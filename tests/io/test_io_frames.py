@@ -13,6 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from recordings import blank_recording, data_path
 from refusals import refused
+from strategies import examples
 
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError
@@ -183,7 +184,7 @@ def test_ranges_that_are_none_are_errors(tmp_path: Path, first: int, stop: int |
     refused(ConfigError, "0 <= first <= stop", open_frames, blank_recording(box_camera(tmp_path, 3)), first, stop)
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(
     cameras=st.lists(st.tuples(st.integers(1, 6), st.integers(-2, 3)), min_size=1, max_size=3),
     cuts=st.sets(st.integers(0, 9)),

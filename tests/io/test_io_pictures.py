@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from refusals import refused
+from strategies import examples
 
 from stseg.arrays import Bytes, Floats
 from stseg.errors import SourceError
@@ -47,7 +48,7 @@ def png_by_hand(numbers: Bytes, bits: int, colour: int) -> bytes:
     return png_of(chunk(b"IHDR", header) + colours + chunk(b"IDAT", zlib.compress(stored)))
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.sampled_from([1, 2, 4, 8]), st.integers(1, 9), st.integers(1, 19), st.integers(0, 2**32 - 1))
 def test_indexed_png_gives_its_numbers(bits: int, height: int, width: int, seed: int) -> None:
     numbers = np.random.default_rng(seed).integers(0, 2**bits, (height, width)).astype(np.uint8)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
-from strategies import recordings
+from strategies import examples, recordings
 
 from stseg.errors import InputError, OutputError, RigError
 from stseg.io.recording.recording import CameraSource, Recording, Source
@@ -184,7 +184,7 @@ class TestRefuse:
 
 
 class TestWrite:
-    @settings(max_examples=50)
+    @settings(max_examples=examples(50))
     @given(st.data())
     def test_reads_back_to_the_last_bit(self, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
         path = tmp_path_factory.mktemp("rig") / "rig.toml"

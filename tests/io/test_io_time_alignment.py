@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import blank_recording
 from refusals import refused
+from strategies import examples
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation
 from stseg.engine.offline.segments import find_gaps
@@ -105,7 +106,7 @@ def test_dropped_frames_leave_holes() -> None:
     assert nearest_frames(np.array([0.0, 1, 2, 5, 6, 8]), 1.0).tolist() == [0, 1, 2, -1, -1, 3, 4, -1, 5]
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(st.sampled_from([10.0, 15.0, 25.0, 29.97, 30.0]), st.lists(st.integers(1, 400), min_size=2, max_size=8))
 def test_files_join_as_if_they_were_one(rate: float, lengths: list[int]) -> None:
     """Stamps in whole milliseconds, at the rig's rate or, for 29.97, that of the standard: no border leaves a trace."""
@@ -218,7 +219,7 @@ def test_starts_are_one_for_each_file(starts: tuple[float, ...], reported: str) 
     refused(SourceError, f"camera cam1, source.starts: found {reported}", align_in_time, recording(source), times)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.lists(st.tuples(st.integers(1, 9), st.integers(-4, 6), st.booleans()), min_size=1, max_size=3))
 def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None:
     rng = np.random.default_rng(0)

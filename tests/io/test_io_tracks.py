@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 from run_files import table_of
+from strategies import examples
 
 from stseg.errors import FormatError, OutputError
 from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
@@ -32,7 +33,7 @@ METRES = st.floats(-1e4, 1e4)
 
 
 @given(rows=st.lists(st.tuples(METRES, METRES), max_size=5))
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 def test_positions_survive_writing_and_reading(
     tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[float, float]]
 ) -> None:

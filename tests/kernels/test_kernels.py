@@ -129,11 +129,14 @@ def damaged(file: Path, kind: str) -> None:
         os.chown(file, 12345, -1)
 
 
+RARER = ("empty", "nbi"), ("flipped", "nbc"), ("writable", "nbi")
+
+
 @COMPILED
 @pytest.mark.skipif(sys.platform == "win32", reason="no owners and modes of files")
 @pytest.mark.parametrize(
     ("kind", "files"),
-    [("empty", "nbi"), ("empty", "nbc"), ("flipped", "nbc"), ("forged", "nbi"), ("writable", "nbi"), ("owned", "nbc")],
+    [("empty", "nbc"), ("forged", "nbi"), ("owned", "nbc"), *(pytest.param(*k, marks=pytest.mark.slow) for k in RARER)],
 )
 def test_files_of_the_cache_are_used_as_this_user_wrote_them(
     cached: Path, tmp_path: Path, kind: str, files: str

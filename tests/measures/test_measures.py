@@ -139,6 +139,10 @@ def test_the_command_writes_tables_and_python_gives_the_same(
         (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, "1"]]])), "a: found coordinates that are no points"),
         (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1e300, 1]]])), "a: found coordinates that are no points"),
         (json.dumps(feature("Polygon", [[[0, 0]] * 20_000])), "a: found 20000 points, expected at most 10000"),
+        (
+            json.dumps(feature("MultiPolygon", [[[[0, 0]] * 6000] * 2])),
+            "a: found 12000 corners or more",
+        ),
         (json.dumps(feature("Polygon", [SQUARE.tolist()]) | {"properties": {"name": "\x1b"}}), r"name: found '.x1b'"),
         ('{"features": 7}', "no Polygon"),
         (json.dumps({"features": [feature("Polygon", [SQUARE.tolist()])] * 2}), "name: found 'a' twice"),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, expecting, likelihoods, people, room
 from scipy.signal import lfilter
 from scipy.special import expit
-from strategies import numbers
+from strategies import examples, numbers
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.bodies.outlines import outlines
@@ -173,7 +173,7 @@ def test_who_is_known_keeps_their_height() -> None:
     assert known.sizes.height[0] == pytest.approx(stranger.sizes.height[0], abs=0.03)
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(numbers(1.45, 1.95))
 def test_taller_people_are_found_taller(height: float) -> None:
     view = pixel_view()

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_files import table_of, trajectory_of
+from strategies import examples
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
@@ -51,7 +52,7 @@ def test_sparse_truth_holds_until_the_next_frame_that_it_knows() -> None:
     assert heights[0] == heights[1] == heights[2] > heights[3] == heights[4] == heights[5]
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.lists(st.tuples(st.integers(0, 900), st.integers(0, 90)), max_size=40))
 def test_bars_of_tracks_never_overlap(spans: list[tuple[int, int]]) -> None:
     first, length = np.reshape(spans, (-1, 2)).T
@@ -121,7 +122,7 @@ def test_each_minute_has_its_own_mean() -> None:
     assert people_per_minute(frames[:0], rows[:0], 1.0).shape == (0,)
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(st.lists(st.integers(0, 199), max_size=60), st.floats(0.2, 3))
 def test_minutes_add_up_to_all_people(drawn: list[int], frame_rate: float) -> None:
     frames, rows = np.arange(200), table_of(TRAJECTORY, frame=drawn)
@@ -161,7 +162,7 @@ def test_a_return_begins_another_stay() -> None:
     assert not dwell(BINS, trajectory_of(), 2.0).any()
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.lists(st.tuples(st.floats(-1, 5), st.floats(-2, 3)), max_size=50))
 def test_every_row_on_the_ground_is_counted_once(places: list[tuple[float, float]]) -> None:
     rows = trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(places)))

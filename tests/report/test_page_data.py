@@ -11,6 +11,7 @@ import pytest
 import run_files
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import examples
 
 from stseg.arrays import AnyArray, Bytes, Labels, Rows, Singles
 from stseg.commands.report import report
@@ -71,7 +72,7 @@ def test_large_ground_is_shown_by_the_greatest_of_some_cells() -> None:
     np.testing.assert_array_equal(coarse(log_odds, 1), log_odds)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.integers(1, 60), st.integers(2, 20))
 def test_spread_frames_reach_from_end_to_end(count: int, most: int) -> None:
     frames = np.arange(10, 10 + count)

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_files import trajectory_of
 from scenes import looking
+from strategies import examples
 
 from stseg.arrays import AnyArray, Boxes, Bytes, Rows
 from stseg.geometry import Camera, Grid, Rig
@@ -158,7 +159,7 @@ def test_names_of_cameras_are_not_on_the_numbers_of_the_axes() -> None:
     assert not changed[: round(bottom), : round(left) - 10].any()
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), max_size=12))
 def test_labels_stay_on_the_canvas(points: list[tuple[float, float]]) -> None:
     centres = place_labels(np.array(points).reshape(-1, 2), [(30, 16)] * len(points), (0, 0, 400, 300))
@@ -191,7 +192,7 @@ def test_a_pillar_is_as_tall_as_its_person() -> None:
     assert abs(body[:, 0].mean() - foot[0]) < 3
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(strategies.cameras(), st.floats(1.2, 2.0))
 def test_the_axis_of_a_body_is_inside_its_outline(camera: Camera, height: float) -> None:
     view = OverlayView(camera, 640)

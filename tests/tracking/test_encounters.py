@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from recordings import compiled_only
 from refusals import refused
 from scenes import boxes, found, people, room
+from strategies import examples
 
 from stseg import Tracker
 from stseg.arrays import Floats, Observation, Rows
@@ -140,13 +141,13 @@ def switches(name: str, kind: str, stop: int) -> int:
 
 
 @compiled_only
-@pytest.mark.parametrize("name", ["crossing", *(pytest.param(name, marks=pytest.mark.slow) for name in SCENES[1:])])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in SCENES])
 def test_nobody_is_taken_for_somebody_else_from_boxes(name: str) -> None:
     assert switches(name, "boxes", NAMED[name].frames) == 0
 
 
 @compiled_only
-@pytest.mark.parametrize("name", ["crossing", "border"])
+@pytest.mark.parametrize("name", ["crossing", pytest.param("border", marks=pytest.mark.slow)])
 def test_nobody_is_taken_for_somebody_else_from_silhouettes(name: str) -> None:
     """The first six seconds, in which people cross."""
     assert switches(name, "pixels", 60) == 0
@@ -195,7 +196,7 @@ def plain(touching: list[set[tuple[int, int]]], names: list[int], parting: int) 
 PAIRS = st.sets(st.sampled_from([(0, 1), (0, 2), (1, 3), (2, 3)]), max_size=3)
 
 
-@settings(max_examples=80)
+@settings(max_examples=examples(80))
 @given(
     st.lists(PAIRS, min_size=LENGTH, max_size=LENGTH), st.permutations([0, 1, 2, 7]),
     st.lists(st.integers(1, LENGTH - 1), max_size=5), st.integers(0, 6),

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_files import trajectory_of
+from strategies import examples
 
 from stseg.arrays import Rows
 from stseg.config import Config, SegmentConfig, TrackingConfig
@@ -31,7 +32,7 @@ def stitched(*segments: tuple[Rows, Rows]) -> StitchedTracks:
     return stitcher.joined()
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(
     st.floats(1.0, 30.0), st.integers(0, 500), st.integers(1, 3000), st.floats(1.0, 60.0), st.integers(0, 10)
 )  # fmt: skip
@@ -56,7 +57,7 @@ def test_less_than_two_segments_become_two_of_equal_work() -> None:
             assert abs((parts[0].stop - parts[0].lead) - (parts[1].stop - parts[1].lead)) <= 2 * 10
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.floats(1.0, 30.0), st.integers(0, 200), st.integers(100, 1500))
 def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> None:
     config = Config(segments=SegmentConfig(length=10.0, warm_up=2.0))
@@ -112,7 +113,7 @@ def test_the_track_that_is_shared_longest_wins() -> None:
     assert joined.committed["id"][joined.local == 2].tolist()[-1] == 1
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(
     st.lists(st.integers(0, 6), min_size=12, max_size=12),
     st.lists(st.tuples(st.integers(0, 3), st.integers(1, 6)), unique=True, max_size=12),

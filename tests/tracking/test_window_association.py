@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from run_files import trajectory_of
 from scenes import corner_cameras
 from scipy.optimize import linear_sum_assignment
-from strategies import numbers
+from strategies import examples, numbers
 
 from stseg.arrays import Flags, Rows
 from stseg.bodies.pillars import BodyTable
@@ -39,7 +39,7 @@ Path = dict[int, tuple[float, float]]
 RUNS = st.tuples(st.integers(0, 200), st.integers(1, 150)).map(lambda run: (run[0], run[0] + run[1]))
 
 
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 @given(RUNS, numbers(0.5, 60), numbers(0.1, 4))
 def test_windows_partition_any_run(run: tuple[int, int], rate: float, seconds: float) -> None:
     first, stop = run
@@ -60,7 +60,7 @@ def test_windows_partition_any_run(run: tuple[int, int], rate: float, seconds: f
         assert after.solve_first < before.solve_stop  # they share frames
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(RUNS, RUNS, numbers(0.5, 60))
 def test_a_part_is_cut_where_the_whole_is(run: tuple[int, int], other: tuple[int, int], rate: float) -> None:
     first, stop = run

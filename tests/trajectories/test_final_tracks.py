@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 from simulated_people import BORDER, CONFIG, RATE, committed, gone, rows_of, runs, straight, swapped, visit
-from strategies import numbers
+from strategies import examples, numbers
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig
@@ -100,7 +100,7 @@ def test_raw_places_stay_beside_the_smoothed() -> None:
     assert (found["xx"] < rows["xx"]).all()
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(runs(5))
 def test_tracks_and_events_of_any_run_do_not_contradict(drawn: Rows) -> None:
     rows = committed(drawn)

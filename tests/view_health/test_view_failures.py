@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import BODY, detector_of, evidence_of, expecting, likelihoods, looking, no_boxes, people, rig_of, room
+from strategies import examples
 
 from stseg import Tracker
 from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence
@@ -119,10 +120,10 @@ def test_a_detector_that_misses_boxes_excludes_no_view(missed: float) -> None:
     (asked, learned), rng, excluded = session("boxes"), np.random.default_rng(6), 0
     standing = STANDING[:2]
     seen = [view for view in shown("boxes", standing) if isinstance(view, Boxes)]
-    for _ in range(150):
+    for _ in range(examples(150)):
         explained(asked, learned, [view.of(rng.random(len(view)) >= missed) for view in seen], 1)
         excluded += int(learned.failures.failing.sum())
-    assert excluded <= 0.01 * 150 * len(seen)
+    assert excluded <= 0.01 * examples(150) * len(seen)
     explained(asked, learned, failed("boxes", "black", seen), 12)
     assert learned.failures.failing.tolist() == [k == FAILED for k in range(4)]
 

@@ -110,6 +110,13 @@ def test_refusals_name_the_file_and_the_outputs(tmp_path: Path) -> None:
     )
     (tmp_path / "text.onnx").write_text("this is no model\n")
     refused(FormatError, r"text\.onnx: found what is no ONNX", OnnxDetector, tmp_path / "text.onnx")
+    for data, found in (
+        (b"", "no graph"),
+        (b"\x3a\0", "no inputs or no outputs"),
+        (b"\x38\1", "in place of a"),
+    ):
+        refused(ValueError, found, parse_header, data)
+    refused(FormatError, "an input of 9999x9999", OnnxDetector, _with_input(tmp_path / "large.onnx", 1, 3, 9999, 9999))
     refused(FormatError, "found the inputs", OnnxDetector, _with_input(tmp_path / "grey.onnx", 1, 1, HEIGHT, WIDTH))
 
 

@@ -1,0 +1,73 @@
+"""What commands refuse before they begin: the option, what was found, what was expected, in one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attacks import film, write_rig
+from refusals import Command, refused
+from run_files import write_empty_run, write_small_run
+
+from stseg.errors import CalibrationError
+from stseg.geometry import Grid, Rig
+
+POINTS = "camera,u,v,x,y\ncam1,10,40,0,0\ncam1,50,40,1,0\ncam1,30,30,0,1\n"
+SCENE = "--size=64,48 --area=0,0,1,1 --frame-rate=5 -o q.toml"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the command is called: a rig, a run, an empty run, a film, matrices and points."""
+    (tmp_path / "other").mkdir()
+    write_rig(tmp_path)
+    write_small_run(tmp_path / "run.h5")
+    write_empty_run(tmp_path / "other" / "empty.h5")
+    film(tmp_path / "film.avi", tmp_path / "plain.avi")
+    for name in ("a.txt", "other/a.txt"):
+        (tmp_path / name).write_text("60 0 32 192\n0 -60 24 324\n0 0 1 6\n")
+    (tmp_path / "points.csv").write_text(POINTS)
+    (tmp_path / "cam1.xml").write_text("<!-- made by stseg -->")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (f"calibrate import opencvv a.txt {SCENE}", "FORMAT: found 'opencvv', expected one of"),
+        (f"calibrate import matrix {SCENE}", "FILE: found nothing, expected one calibration a camera"),
+        (f"calibrate import matrix a.txt a.txt {SCENE}", "--names: found files and folders that share their names"),
+        ("calibrate page film.avi film.avi --area=0,0,1,1 -o q.html", "VIDEO: found film.avi, film.avi"),
+        ("calibrate page film.avi --frame 99 --area=0,0,1,1 -o q.html", "--frame: found 99, expected a frame of the"),
+        ("calibrate align rig.toml points.csv -o q.toml --metres-per-pixel 0", "--metres-per-pixel: found 0"),
+        ("calibrate align rig.toml points.csv -o q.toml --metres-per-pixel nan", "--metres-per-pixel: found nan"),
+        ("calibrate check rig.toml --frames 5:3", "--frames: found '5:3'"),
+        ("calibrate check rig.toml --frames 4:9", "--frames: found 4:9, expected a part of the recording"),
+        ("calibrate check rig.toml -o boxes.csv --overwrite", "boxes.csv: found a file that is read here"),
+        (f"calibrate points points.csv --lens {{name}}.xml {SCENE[:-6]}cam1.xml --overwrite", "a file that is read"),
+        ("detect rig.toml -o other --score 2", "--score: found 2, expected a number of 0..1"),
+        ("inspect rig.toml --json", "--json: found rig.toml, expected a run file"),
+        ("inspect rig.toml --slice z=1", "--slice: found rig.toml, expected a run file"),
+        ("inspect other/empty.h5 --slice frame=1,plane=all -o q.png", "expected a run with frames"),
+        ("review run.h5 -o q.html --most 0", "--most: found 0, expected 1 or more questions"),
+        ("run rig.toml -o q.h5 --publish http://127.0.0.1:1", "--publish: found that alone"),
+        ("plan rig.toml --set kalman.patience=3", "kalman.patience: found a value without effect: 3.0"),
+    ],
+)  # fmt: skip
+def test_options_are_refused(folder: Path, words: str, message: str, refusal: Command) -> None:
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert message in refusal(*words.split())
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("ground", "vertical", "names", "message"),
+    [
+        (np.zeros((1, 3, 3)), np.zeros((2, 3)), (), r"found arrays of \(1, 3, 3\) and \(2, 3\) for 2 cameras"),
+        (np.zeros((2, 3, 3)), np.zeros((2, 4)), (), r"found arrays of \(2, 3, 3\) and \(2, 4\) for 2 cameras"),
+        (np.zeros((2, 3, 3)), np.zeros((2, 3)), ("a", "a"), "names: found a, a, expected 2 different names"),
+    ],
+)
+def test_arrays_of_rigs_are_refused(ground: object, vertical: object, names: tuple[str, ...], message: str) -> None:
+    call = Rig.from_homographies
+    refused(CalibrationError, message, call, ground, vertical, [(64, 48)] * 2, Grid((0, 1), (0, 1)), 5.0, names=names)  # type: ignore[arg-type]
