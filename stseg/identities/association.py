@@ -103,14 +103,15 @@ class IdentityProblem:
         precision, information = self.model.evidence(value)
         return visits.after(earlier["id"], number * precision, number * information)
 
-    def score(self, constraints: Constraints, since: float, until: float) -> float:
-        """Score of the best identities of the rows from `since` until `until`, seconds: nats.
+    def score(self, constraints: Constraints, chosen: Ints, left_out: Ints, stand_in: Ints) -> float:
+        """Score of the best identities of some rows of the trajectory alone, int64 (k,), rising: nats.
 
-        Constraints are pairs of rows; those of which a row lies outside are left out.
+        Constraints are pairs of rows; those of which a row is not chosen are left out. The size evidence of rows that
+        are `left_out`, int64 (m,), counts for those that stand in for them, int64 (m,).
         """
-        start, stop = np.searchsorted(self.observations.seconds, (since, until)).tolist()
-        part = self.observations.between(start, stop)
-        place = np.full(len(self.observations.order), -1)
+        number = np.argsort(self.observations.order)
+        part = self.observations.at(np.sort(number[chosen]), number[left_out], number[stand_in])
+        place = np.full(len(number), -1)
         place[part.order] = np.arange(len(part.order))
         bound = constraints.renumbered(place).among()
         return search_identities(part, self.model, self.motion, self.limits, bound).score

@@ -61,7 +61,7 @@ BOX = np.dtype(
 """A track's box in one view: around its localisation over all planes."""
 
 EVENT = np.dtype([("frame", "<i8"), ("kind", "S12"), ("id", "<i8"), ("other", "<i8"), ("reason", "S96")])
-"""birth, death, merge, split, hand-over, return, dropped, blind, crowd; `other` is the other track, 0 for none."""
+"""birth, death, merge, split, hand-over, doubt, return, dropped, blind, crowd; `other` is another track, 0 for none."""
 
 CORRECTION = np.dtype(
     [

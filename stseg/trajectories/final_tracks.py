@@ -21,6 +21,7 @@ from stseg.config import Config, TrackingConfig
 from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem, Link, associate_globally
 from stseg.identities.evidence.returns import Return
 from stseg.identities.evidence.size_model import MeasuredSizes
+from stseg.identities.review.weighed_doubts import doubt_events
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
 from stseg.records.tables import BOX, EVENT
@@ -60,9 +61,10 @@ def final_tracks(
     identity = np.where(np.isin(named, kept["id"]), named, 0)
     met = _encounters(events, _Names(committed, identity), frame_rate, config.tracking)
     renamed = _renamed(events, _Names(committed, named), linked.links)
-    every_event = np.concatenate([renamed, met, dropped])
     tracks = fill_gaps(bridged[np.isin(bridged["id"], kept["id"])], frame_rate, config.tracking, True)
     smoothed = smooth_places(tracks, frame_rate, config.motion)
+    doubts = doubt_events(smoothed, bridged[: len(committed)], problem, constraints)
+    every_event = np.concatenate([renamed, met, dropped, doubts])
     whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
     least = config.tracking.return_probability
     if least == 1:

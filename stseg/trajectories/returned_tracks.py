@@ -55,7 +55,8 @@ def renamed_trajectory(trajectory: Rows, returns: Sequence[Return]) -> Rows:
 
 
 def renamed_events(events: Rows, trajectory: Rows, returns: Sequence[Return], frame_rate: float) -> Rows:
-    """Events under the ids of people, and their returns; between visits there is neither birth nor death.
+    """Events under the ids of people, and their returns; between visits there is neither birth nor death,
+    nor is it in doubt whether they are one person's.
 
     Parameters
     ----------
@@ -77,6 +78,7 @@ def renamed_events(events: Rows, trajectory: Rows, returns: Sequence[Return], fr
     between = here & (
         ((named["kind"] == b"birth") & (named["frame"] > first[person]))
         | ((named["kind"] == b"death") & (named["frame"] < last[person]))
+        | ((named["kind"] == b"doubt") & (named["id"] == named["other"]))
     )
     came = [(one.frame, b"return", one.identity, 0, _reason(one, frame_rate).encode()) for one in returns]
     joined = np.concatenate([named[~between], np.array(came, EVENT)])

@@ -41,7 +41,7 @@ def test_alike_people_are_more_doubtful_than_different_ones() -> None:
     margins = []
     for heights in ((1.6, 1.9), (1.75, 1.75)):
         rows = encounter(*heights)
-        (doubt,) = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+        (doubt,) = find_doubts(rows, 10.0, BORDER)
         assert (doubt.question, doubt.track, doubt.other, doubt.first, doubt.last) == ("encounter", 1, 2, 46, 54)
         margins.append(doubt.margin)
     assert margins[0] > margins[1] > 0
@@ -51,7 +51,7 @@ def test_a_swap_that_motion_denies_comes_first() -> None:
     rows = encounter(1.75, 1.75)
     later = rows["frame"] > 50
     rows["id"][later] = 3 - rows["id"][later]
-    (doubt,) = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+    (doubt,) = find_doubts(rows, 10.0, BORDER)
     assert doubt.margin < 0
 
 
@@ -60,7 +60,7 @@ def test_gaps_and_weak_tracks_are_asked_about() -> None:
         [walk(1, 0, np.linspace(-4.8, 0, 61), 0.0, 1.7), walk(2, 70, np.linspace(0.7, 4.8, 61), 0.0, 1.7),
          walk(3, 20, np.linspace(2, 2.2, 10), 3.0, 1.7, 0.5)]
     )  # fmt: skip
-    doubts = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+    doubts = find_doubts(rows, 10.0, BORDER)
     assert {(one.question, one.track, one.other) for one in doubts} >= {("gap", 1, 2), ("false", 3, 0)}
 
 
@@ -70,7 +70,7 @@ def test_who_appears_beside_a_track_may_be_who_that_was() -> None:
         [walk(1, 0, np.linspace(-4, 0, 51), 0.0, 1.7), walk(1, 51, np.linspace(1.2, 1.3, 5), 1.2, 1.7),
          walk(2, 51, np.linspace(0.08, 4, 50), 0.0, 1.7)]
     )  # fmt: skip
-    doubts = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+    doubts = find_doubts(rows, 10.0, BORDER)
     assert ("birth", 1, 2, 50, 51) in {(one.question, one.track, one.other, one.first, one.last) for one in doubts}
 
 
@@ -122,7 +122,7 @@ def test_every_answer_to_every_question_is_accepted(tmp_path: Path, seed: int) -
         ]
     )
     rows["score"] = lots.uniform(0, 2, len(rows))
-    doubts = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+    doubts = find_doubts(rows, 10.0, BORDER)
     assert {one.question for one in doubts} == {"encounter", "gap", "birth", "false"}
     for doubt in doubts:
         for _, _, lines in question_words(doubt)[1]:
@@ -133,7 +133,7 @@ def test_every_answer_to_every_question_is_accepted(tmp_path: Path, seed: int) -
 
 
 def test_without_tracks_nothing_is_doubted() -> None:
-    assert find_doubts(np.zeros(0, TRAJECTORY), Tracks(np.zeros(0, TRAJECTORY)).summary(), 10.0, BORDER) == []
+    assert find_doubts(np.zeros(0, TRAJECTORY), 10.0, BORDER) == []
 
 
 def tracks(*spans: tuple[int, int]) -> Rows:

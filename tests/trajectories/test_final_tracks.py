@@ -10,6 +10,7 @@ from strategies import examples, numbers
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig
+from stseg.identities.search.constraints import Constraints
 from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import APPEARANCE, TRAJECTORY
 from stseg.trackers.rows import event_rows
@@ -81,6 +82,22 @@ def test_events_of_a_swap_are_under_the_names_that_are_right() -> None:
         (159, b"death", 2, 0),
         (159, b"death", 1, 0),
     ]
+
+
+@pytest.mark.parametrize(("other_height", "doubts"), [(1.7, [(1, 2)]), (1.9, [])])
+def test_a_meeting_that_no_evidence_decides_is_a_doubt(other_height: float, doubts: list[tuple[int, int]]) -> None:
+    rows = committed(rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), other_height, range(160))}))
+    events = whole(rows, events_of()).events
+    found = events[events["kind"] == b"doubt"]
+    assert [(int(e["id"]), int(e["other"])) for e in found] == doubts
+    assert all(e["frame"] == 80 and e["reason"].startswith(b"exchanged in this encounter with a prob") for e in found)
+    known = Constraints.of([(next_row(rows, 1, 40), next_row(rows, 1, 120))], [])
+    told = final_tracks(rows, events_of(), np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, known)
+    assert not (told.events["kind"] == b"doubt").any(), "an answer decides it"
+
+
+def next_row(rows: Rows, track: int, frame: int) -> int:
+    return int(np.flatnonzero((rows["id"] == track) & (rows["frame"] == frame))[0])
 
 
 def test_rows_of_dropped_tracks_have_no_identity() -> None:

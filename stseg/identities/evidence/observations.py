@@ -86,15 +86,23 @@ class Observations:
         np.add.at(information, head, self.information)
         return replace(self, precision=precision, information=information)
 
-    def between(self, start: int, stop: int) -> Observations:
-        """Those of the frames from `start` to before `stop`; people observed before are new there."""
-        first, last = int(self.start[start]), int(self.start[stop])
-        part = slice(first, last)
-        previous = np.where(self.previous[part] >= first, self.previous[part] - first, -1)
+    def at(self, chosen: Ints, left_out: Ints, stand_in: Ints) -> Observations:
+        """Some of them alone, int64 (k,), rising; people of whom none was observed before are new there.
+
+        The size evidence of those that are left out, int64 (m,), counts for chosen ones that stand in for each, (m,).
+        """
+        frame = np.repeat(np.arange(len(self.seconds)), np.diff(self.start))[chosen]
+        frames, start = np.unique(frame, return_index=True)
+        place = np.full(len(self.order) + 1, -1)  # the last is that of no observation
+        place[chosen] = np.arange(len(chosen))
+        previous = place[self.previous[chosen]]
+        precision, information = self.precision[chosen], self.information[chosen]
+        np.add.at(precision, place[stand_in], self.precision[left_out])
+        np.add.at(information, place[stand_in], self.information[left_out])
         return Observations(
-            self.order[part], self.start[start : stop + 1] - first, self.seconds[start:stop], self.ground[part],
-            self.variance[part], previous, self.certain[part] & (previous >= 0), self.inside[part],
-            self.precision[part], self.information[part],
+            self.order[chosen], np.append(start, len(chosen)), self.seconds[frames], self.ground[chosen],
+            self.variance[chosen], previous, self.certain[chosen] & (previous >= 0), self.inside[chosen],
+            precision, information,
         )  # fmt: skip
 
 

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.arrays import Flags, Ints, Rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.search.constraints import Constraints
 from stseg.records.tables import ANSWER
+from stseg.tracking.row_groups import near_rows
 
 _SEPARATION_DISTANCE = 0.8
 """Distance from which on two people stand apart, metres."""
@@ -73,7 +74,7 @@ def answered_rows(rows: Rows, answers: Sequence[Answer], frame_rate: float) -> A
     `rows` TRAJECTORY (n,) are under the ids that the answers name, 0 for rows of no track; `frame_rate` is in frames
     per second.
     """
-    tracks = _Tracks(rows, frame_rate)
+    tracks = RowsOfTracks(rows, frame_rate)
     same, other = dict[tuple[int, int], str](), dict[tuple[int, int], str]()
     deleted = np.zeros(len(rows), bool)
     for answer in answers:
@@ -88,12 +89,14 @@ def answered_rows(rows: Rows, answers: Sequence[Answer], frame_rate: float) -> A
     return AnsweredRows(Constraints.of(list(same), list(other)), [*same.values(), *other.values()], deleted)
 
 
-class _Tracks:
-    """Rows of each track in the order of time."""
+class RowsOfTracks:
+    """Rows of each track in the order of time: TRAJECTORY (n,) under ids, 0 for none, at frames per second."""
 
     def __init__(self, rows: Rows, frame_rate: float) -> None:
         self.rows, self.frame_rate, self.reach = rows, frame_rate, _SEARCH_TIME * frame_rate
-        self.of, self.by_frame = _divided(rows["id"], rows["frame"]), _divided(rows["frame"], rows["id"])
+        self.of = _divided(rows["id"], rows["frame"])
+        self.is_solitary = np.ones(len(rows), bool)
+        self.is_solitary[near_rows(rows, _SEPARATION_DISTANCE)[0]] = False
 
     def pairs(self, answer: Answer) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
         """Pairs of rows that are one person by an answer, and pairs that are two."""
@@ -140,24 +143,23 @@ class _Tracks:
         """The first of some rows in which a track is apart from another; a solitary one if that is soon after."""
         if not len(rows):
             return None
-        distant = rows[self._distances(rows, other) >= _SEPARATION_DISTANCE]
+        distant = rows[self._is_apart(rows, other)]
         first = distant[0] if len(distant) else rows[0]
         passed = np.abs(self.rows["frame"][rows] - self.rows["frame"][first])
         soon = rows[
             (passed <= _SOLITARY_TIME * self.frame_rate) & (np.arange(len(rows)) >= np.flatnonzero(rows == first)[0])
         ]
-        alone = soon[self._distances(soon, 0) >= _SEPARATION_DISTANCE]
+        alone = soon[self.is_solitary[soon]]
         return int(alone[0] if len(alone) else first)
 
-    def _distances(self, rows: Ints, other: int) -> Floats:
-        """Distance of rows (n,) from another track in the same frame, or from the nearest (0); inf where alone."""
-        away = np.full(len(rows), np.inf)
-        for k, row in enumerate(rows.tolist()):
-            here = self.by_frame[int(self.rows["frame"][row])]
-            here = here[(here != row) & ((self.rows["id"][here] == other) | (other == 0))]
-            x, y = (self.rows[name][here] - self.rows[name][row] for name in ("x", "y"))
-            away[k] = np.hypot(x, y).min(initial=np.inf)
-        return away
+    def _is_apart(self, rows: Ints, other: int) -> Flags:
+        """Whether a track is apart from another in each of its rows (n,); from all others for 0."""
+        if not other:
+            return self.is_solitary[rows]
+        of_other, frame = self.of[other], self.rows["frame"]
+        at = of_other[np.searchsorted(frame[of_other], frame[rows]).clip(max=len(of_other) - 1)]
+        x, y = (self.rows[name][at] - self.rows[name][rows] for name in ("x", "y"))
+        return np.asarray((frame[at] != frame[rows]) | (np.hypot(x, y) >= _SEPARATION_DISTANCE))
 
 
 def _divided(key: Ints, order: Ints) -> dict[int, Ints]:

@@ -47,22 +47,36 @@ class Doubt:
     margin: float
     """Evidence for the decision against its alternative, nats; small is doubtful."""
 
+    @property
+    def frame(self) -> int:
+        """The frame in which it is decided: the middle one."""
+        return (self.first + self.last + 1) // 2
 
-def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> list[Doubt]:
+
+def find_doubts(trajectory: Rows, frame_rate: float, border: Floats) -> list[Doubt]:
     """Doubtful decisions of a run, the most doubtful first.
 
     `frame_rate` is in frames per second; `border` float64 (2, 2) the lower and upper corner of the area, metres.
     """
-    if not len(tracks):
+    found = [*identity_doubts(trajectory, frame_rate), *_weak(_by_track(trajectory), frame_rate, border)]
+    return sorted(found, key=lambda one: (one.margin, one.first, one.track))
+
+
+def identity_doubts(trajectory: Rows, frame_rate: float) -> list[Doubt]:
+    """Encounters, births and gaps of TRAJECTORY (n,), at frames per second: all but the question of existence."""
+    rows = _by_track(trajectory)
+    if not rows:
         return []
+    met = _encounters(rows, frame_rate)
+    births = _births(rows, frame_rate, {(one.other, one.track, one.first) for one in met})
+    return [*met, *births, *_gaps(rows, frame_rate)]
+
+
+def _by_track(trajectory: Rows) -> dict[int, Rows]:
+    """Rows of each track in the order of time, by rising id."""
     ordered = trajectory[np.argsort(trajectory["frame"], kind="stable")]
     divided = [ordered[index] for index in rows_of_tracks(ordered["id"])]
-    by_track = {int(one["id"][0]): one for one in divided}
-    rows = {int(identity): by_track[int(identity)] for identity in tracks["id"]}
-    found = _encounters(rows, frame_rate)
-    found += _births(rows, frame_rate, {(one.other, one.track, one.first) for one in found})
-    found += [*_gaps(rows, frame_rate), *_weak(rows, frame_rate, border)]
-    return sorted(found, key=lambda one: (one.margin, one.first, one.track))
+    return {int(one["id"][0]): one for one in divided}
 
 
 def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
@@ -162,7 +176,9 @@ def _births(rows: dict[int, Rows], frame_rate: float, met: set[tuple[int, int, i
 
 def _weak(rows: dict[int, Rows], frame_rate: float, border: Floats) -> list[Doubt]:
     """Tracks that begin and end inside the area: the decision is that they are people."""
-    found = []
+    found: list[Doubt] = []
+    if not rows:
+        return found
     first, last = min(one["frame"][0] for one in rows.values()), max(one["frame"][-1] for one in rows.values())
     for identity, of_track in rows.items():
         ends = np.array([[of_track["x"][k], of_track["y"][k]] for k in (0, -1)])
