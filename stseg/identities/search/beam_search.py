@@ -24,8 +24,6 @@ _BIRTH = 6.0
 """Cost of a birth or a death inside the area, nats (per square metre)."""
 _ABSENCE = 1.0
 """Cost of being unseen, nats per second."""
-_LEAST_PLACE = -25.0
-"""Least evidence of a place against an identity, nats."""
 _ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0
 """Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats."""
 _SPARE = 16
@@ -161,6 +159,6 @@ def search_identities(
 def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rules:
     """The constants of the search."""
     return Rules(
-        _BIRTH, _ABSENCE, _LEAST_PLACE, limits.longest, _ALTERNATIVE_LOSS, _BEAM_LOSS, motion.velocity_noise**2,
+        _BIRTH, _ABSENCE, limits.longest, _ALTERNATIVE_LOSS, _BEAM_LOSS, motion.velocity_noise**2,
         motion.speed_spread**2, sizes.spread, sizes.most_against * sizes.variance,
     )  # fmt: skip

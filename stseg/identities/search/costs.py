@@ -64,14 +64,11 @@ def _fill_costs(
     spreads = predicted_variance(pasts.covariance, p, since, rules.turn)
     for i in range(len(alone)):
         r = first + i
-        follows = observed.previous[r] == pasts.last[p]
-        if observed.certain[r] and not follows:
+        if observed.certain[r] and observed.previous[r] != pasts.last[p]:
             continue
         total = spreads + observed.variance[r]
         square = (observed.ground[r, 0] - x) ** 2 + (observed.ground[r, 1] - y) ** 2
-        gain = max(-0.5 * square / total, rules.least) - math.log(2.0 * math.pi * total) - rules.absence * since
-        if gain < 4.0 * rules.least and not follows:
-            continue
+        gain = -0.5 * square / total - math.log(2.0 * math.pi * total) - rules.absence * since
         for d in range(alone.shape[1]):
             if observed.precision[r, d] == 0.0:
                 continue

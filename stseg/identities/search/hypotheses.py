@@ -216,8 +216,6 @@ class Rules(NamedTuple):
     """Cost of a birth or a death inside the area, nats."""
     absence: float
     """Cost of being unseen, nats per second."""
-    least: float
-    """Least evidence of a place against an identity, nats."""
     longest: float
     """Longest time unseen, seconds."""
     alternative_loss: float
