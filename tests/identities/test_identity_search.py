@@ -82,16 +82,15 @@ def test_what_comes_later_counts_where_a_track_is_certain() -> None:
 @pytest.mark.parametrize(
     ("names", "columns", "distinct"),
     [
-        ([[0, 3], [1, 3]], [0, 0], 1),  # one begins a frame later, which is the same birth
-        ([[0, 3], [2, 3]], [0, 0], 2),  # another birth
-        ([[0, 1], [0, 1]], [0, 1], 2),  # two of one birth, of whom either is there
+        ([[0, 3], [3, 0]], [0, 1], 1),  # the same people in other slots
+        ([[0, 3], [1, 3]], [0, 0], 2),  # one begins a frame later
+        ([[0, 1], [0, 1]], [0, 1], 2),  # either of two is there
     ],
 )
-def test_hypotheses_that_differ_in_the_frame_of_a_birth_are_one(
+def test_of_hypotheses_with_the_same_people_the_best_is_kept(
     names: list[list[int]], columns: list[int], distinct: int
 ) -> None:
     seen = seen_of(rows_of({1: (straight(-3, 0, 0.5, 0), 1.7, range(5))})).rows()
-    seen.birth[:] = np.array([1 << 40, 1 << 40, 3 << 40, 5 << 40, 7 << 40])
     held, pasts = Hypotheses.empty(2, 2, 0), Pasts.empty(4, 1)
     held.past[:], pasts.name[:], pasts.last[:] = [[0, 1], [2, 3]], np.ravel(names), 0
     change, value = np.array([[h, -1, -1, -1, -1] for h in range(2)]), np.array([2.0, 1.0])
@@ -101,16 +100,6 @@ def test_hypotheses_that_differ_in_the_frame_of_a_birth_are_one(
         empty_present(2, 2), chosen,
     )  # fmt: skip
     assert chosen[:number].tolist() == [0, 1][:distinct]
-
-
-def test_births_within_a_second_of_a_track_are_one() -> None:
-    rows = rows_of({1: (straight(-3, 0, 0.5, 0), 1.7, range(20)), 2: (straight(3, 0, 0.5, 0), 1.7, range(20))})
-    seen = seen_of(rows)
-    birth, track = seen.birth(), rows["id"][seen.order]
-    second = np.repeat(np.floor(seen.seconds), np.diff(seen.start))
-    assert len(np.unique(birth)) == len(np.unique(np.stack([track, second]), axis=1).T) == 6
-    for one in np.unique(birth):
-        assert len(np.unique(track[birth == one])) == len(np.unique(second[birth == one])) == 1
 
 
 def sizes_of(people: Floats, noise: float, seed: int = 0) -> tuple[MeasuredSizes, Ints, list[Ints]]:

@@ -59,11 +59,9 @@ WHOLE: dict[str, tuple[str, Any]] = {
 FINAL: dict[str, tuple[str, Any]] = {
     "sizes foreseen": (f"{_OBSERVED}.Observations.with_foreseen_sizes", lambda observed: observed),
     "certain rows": (f"{_OBSERVED}._certain", lambda rows, _: np.zeros(len(rows), bool)),
-    "births of a second as one": (f"{_OBSERVED}.Observations.birth", lambda observed: np.arange(len(observed.order))),
     "short tracks dropped": (f"{_FINAL}.drop_short", lambda rows, *_: (rows, _NO_EVENTS)),
     "short gaps filled": (f"{_FINAL}.interpolated_rows", lambda rows, *_: rows[:0]),
     "encounters": ("stseg.tracking.row_groups._meetings", lambda rows, _: (rows["id"][:0], rows["frame"][:0])),
-    "bounded places": ("stseg.identities.search.beam_search._LEAST_PLACE", -1e6),
     "least error of places": (f"{_OBSERVED}._LEAST_PLACE_ERROR", 1e-3),
     "last smoothing": (f"{_FINAL}.smooth_places", lambda rows, *_: rows),
 }

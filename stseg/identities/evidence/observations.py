@@ -14,14 +14,12 @@ from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.border import Border
 from stseg.tracking.row_groups import EXCHANGE_DISTANCE, near_rows
 
-_BIRTH_TIME = 1.0
-"""Time within which births in one track count as one, seconds."""
 _LEAST_PLACE_ERROR = 0.05
 """Least error of a place, metres (standard deviation)."""
 
 
 class ObservedRows(NamedTuple):
-    """Rows of a run for kernels; all but `birth` and `sign` as of `Observations`."""
+    """Rows of a run for kernels; all but `sign` as of `Observations`."""
 
     ground: Floats
     variance: Floats
@@ -30,8 +28,6 @@ class ObservedRows(NamedTuple):
     inside: Floats
     precision: Floats
     information: Floats
-    birth: Ints
-    """int64 (n,): a number for each birth, drawn at random, of 62 bits."""
     sign: Ints
     """int64 (n,): a number for each row, drawn at random, of 62 bits."""
 
@@ -61,19 +57,19 @@ class Observations:
     information: Floats
     """float64 (n, size): the precision times the deviation of the size from the population's mean."""
 
-    def birth(self) -> Ints:
-        """A number of each filter track and second, of which births are one, int64 (n,)."""
-        second = np.repeat(self.seconds // _BIRTH_TIME, np.diff(self.start))
-        track = _heads(self.previous, self.previous >= 0)
-        return np.asarray(np.unique(np.stack([track, second]), axis=1, return_inverse=True)[1].reshape(-1), np.int64)
-
     def rows(self) -> ObservedRows:
-        """The observations for kernels, with a random number of each birth and row."""
-        drawn = np.random.default_rng(0).integers(1 << 61, size=(2, len(self.order))) * 2 + 1
+        """The observations for kernels, with a random number of each row."""
+        drawn = np.random.default_rng(0).integers(1 << 61, size=len(self.order)) * 2 + 1
         return ObservedRows(
-            self.ground, self.variance, self.previous, self.certain, self.inside, self.precision, self.information,
-            drawn[0][self.birth()], drawn[1],
-        )  # fmt: skip
+            self.ground,
+            self.variance,
+            self.previous,
+            self.certain,
+            self.inside,
+            self.precision,
+            self.information,
+            drawn,
+        )
 
     def with_foreseen_sizes(self) -> Observations:
         """The same, with the size evidence of each unambiguous part of a track moved to its first observation.

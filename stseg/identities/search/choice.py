@@ -1,9 +1,7 @@
 """The choice of the best hypotheses among alternatives: of those of one key the best alone.
 
 A key tells who is present in a hypothesis, and who is unseen: hypotheses of one key have the same future. It is a sum
-of numbers drawn at random for each birth and each row (Zobrist 1970): of each identity's birth times that of its last
-row. Identities of one birth are the same: hypotheses that differ in nothing but the frame of it are one. Where several
-identities of a hypothesis have one birth, their order tells them apart.
+of numbers drawn at random for each row (Zobrist 1970): of each identity's first row times that of its last one.
 
 Keys take time, and of many alternatives few are chosen: they are found for the best first, until enough differ.
 """
@@ -30,10 +28,6 @@ class Present(NamedTuple):
 
     name: Ints
     """int64 (hypothesis, slot): first row of each identity, -1 for none."""
-    birth: Ints
-    """int64 (hypothesis, slot): number of its birth."""
-    kin: Ints
-    """int64 (hypothesis, slot): number of each identity in other hypotheses, too."""
     unseen: Ints
     """int64 (hypothesis, slot): its term of the key where it has no row of the frame."""
     key: Ints
@@ -79,10 +73,7 @@ def choose_distinct(
 def empty_present(hypotheses: int, slots: int) -> Present:
     """Room for the people of some hypotheses."""
     shape = hypotheses, slots
-    return Present(
-        np.empty(shape, np.int64), np.empty(shape, np.int64), np.empty(shape, np.int64), np.empty(shape, np.int64),
-        np.full(hypotheses, -1),
-    )  # fmt: skip
+    return Present(np.empty(shape, np.int64), np.empty(shape, np.int64), np.full(hypotheses, -1))
 
 
 @part
@@ -95,11 +86,8 @@ def _fill_present(
     for s in range(slots):
         p = hypotheses.past[h, s]
         present.name[h, s] = pasts.name[p] if p >= 0 else -1
-        present.birth[h, s] = observed.birth[present.name[h, s]] if p >= 0 else -1
-    for s in range(slots):
-        if present.name[h, s] >= 0:
-            present.kin[h, s] = _kin(present, h, present.name[h, s], present.birth[h, s])
-            present.unseen[h, s] = _product(present.kin[h, s], observed.sign[pasts.last[hypotheses.past[h, s]]])
+        if p >= 0:
+            present.unseen[h, s] = _product(observed.sign[pasts.name[p]], observed.sign[pasts.last[p]])
             key = (key + int(present.unseen[h, s])) & KEY_BITS
     for i in range(column.shape[1]):
         key += _key_term(present, h, observed, first + i, column[h, i])
@@ -125,23 +113,13 @@ def _key_of(
 def _key_term(present: Present, h: int, observed: ObservedRows, r: int, s: int) -> int:
     """Change of the key of a hypothesis where row r is that of a slot, or of a new person (-1)."""
     if s < 0:
-        return _product(_kin(present, h, r, observed.birth[r]), observed.sign[r])
-    return int(_product(present.kin[h, s], observed.sign[r]) - present.unseen[h, s])
+        return _product(observed.sign[r], observed.sign[r])
+    return int(_product(observed.sign[present.name[h, s]], observed.sign[r]) - present.unseen[h, s])
 
 
 @part
 def _product(one: int, other: int) -> int:
     return (int(one) * int(other)) & KEY_BITS
-
-
-@part
-def _kin(present: Present, h: int, name: int, birth: int) -> int:
-    """Number of an identity by its birth, and by how many others of that birth began before."""
-    rank = 0
-    for s in range(present.name.shape[1]):
-        if 0 <= present.name[h, s] < name and present.birth[h, s] == birth:
-            rank += 1
-    return int(birth + rank)
 
 
 @part
