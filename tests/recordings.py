@@ -57,6 +57,11 @@ def data_path(name: str) -> Path:
     return path
 
 
+def in_ci(*cases: object) -> list[object]:
+    """Cases of a parametrised test that CI runs, and plain pytest does not: others show the same in less time."""
+    return [pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.slow) for case in cases]
+
+
 def blank_recording(*sources: CameraSource, size: tuple[int, int] = (16, 12), rate: float = 5.0) -> Recording:
     """Cameras cam1, cam2, ... that look straight down on a square metre."""
     cameras = tuple(Camera(f"cam{k}", size, np.eye(3), np.array([0.0, 0.0, -1.0])) for k in range(1, len(sources) + 1))

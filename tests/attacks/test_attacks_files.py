@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attacks import RIG, write_rig
-from recordings import COMMAND, process
+from recordings import COMMAND, in_ci, process
 from refusals import REFUSAL_TIME, Command, refused
 
 from stseg.commands.main import main
@@ -126,7 +126,7 @@ def test_a_recording_that_changed_in_place_is_noticed(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a limit of file sizes that can be set")
-@pytest.mark.parametrize("to", ["sqlite", "duckdb", "jupedsim", "csv"])
+@pytest.mark.parametrize("to", ["sqlite", *in_ci("duckdb", "jupedsim", "csv")])
 def test_a_limit_of_file_sizes_is_one_line(run_path: Path, to: str) -> None:
     """F19: SQLite reports a disk error of its own kind."""
     if to == "duckdb":

@@ -9,13 +9,14 @@ from fuzz.runner import fuzz
 from fuzz.targets import TARGETS, Target, answer
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recordings import in_ci
 from strategies import examples
 
 from stseg.errors import printable
 from stseg.io.toml import parse_toml
 from stseg.io.untrusted.values import abbreviated, is_name, parse_number, parse_whole
 
-SEEDS = [(1_000_000, 20), pytest.param((1_000_020, 40), marks=pytest.mark.slow)]
+SEEDS = [(1_000_000, 10), *in_ci(((1_000_010, 50),))]
 """First seed and number of mutated files of each target."""
 
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from browser import CHROMIUM, Page, chromium
-from recordings import data_path
+from recordings import data_path, in_ci
 from refusals import refused
 from simulated_people import SIZE, exchanged, moved, ring, shown, walkers
 
@@ -36,7 +36,6 @@ from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig
 from stseg.tasks.warnings import explained_by_swap
 
-slow = pytest.mark.slow
 RIG = ring()
 WALK = walkers(40)
 SHOWN = shown(RIG, WALK)
@@ -88,10 +87,7 @@ class TestVerdict:
 
     @pytest.mark.parametrize(
         ("view", "kind", "amount"),
-        [
-            (1, "z", 0.25),
-            *(pytest.param(*one, marks=slow) for one in ((0, "x", 0.4), (1, "y", -0.4), (0, "yaw", 14.0))),
-        ],
+        [(1, "z", 0.25), *in_ci((0, "x", 0.4), (1, "y", -0.4), (0, "yaw", 14.0))],
     )
     def test_the_camera_that_is_off_is_named(self, view: int, kind: str, amount: float) -> None:
         check, words = judged(moved(RIG, view, kind, amount))
@@ -107,7 +103,7 @@ class TestVerdict:
         assert view.right < -0.2, "the rig says further right, so people show to the left"
         assert "to the left" in words[0] and " px" in words[0]
 
-    @slow
+    @pytest.mark.slow
     def test_two_that_are_off_are_named(self) -> None:
         rig = ring(6)
         boxes = shown(rig, WALK[:30])
@@ -128,14 +124,14 @@ class TestVerdict:
 
 
 class TestBlunders:
-    @pytest.mark.parametrize(("first", "second"), [(1, 3), pytest.param(0, 1, marks=slow)])
+    @pytest.mark.parametrize(("first", "second"), [(1, 3), *in_ci((0, 1))])
     def test_swapped_streams_are_named(self, first: int, second: int) -> None:
         check, words = judged(exchanged(RIG, first, second))
         assert check.swapped == (first, second)
         pair = f"cam{first + 1} and cam{second + 1}"
         assert words[0] == f"{pair} seem to be swapped: their frames fit far better the other way round"
 
-    @pytest.mark.parametrize(("view", "frames"), [(2, -3), pytest.param(0, 2, marks=slow)])
+    @pytest.mark.parametrize(("view", "frames"), [(2, -3), *in_ci((0, 2))])
     def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
         nothing = [np.zeros((0, 4))] * 4
         boxes = {frame: list(views) for frame, views in SHOWN.items()}

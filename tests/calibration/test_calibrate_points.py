@@ -10,7 +10,7 @@ from hypothesis import given
 from recordings import track, write_recording
 from refusals import refused
 from scenes import looking, rig_of, walkers
-from strategies import BARREL, Pose, poses
+from strategies import BARREL, Pose, examples, poses
 
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.points.camera_models import Points
@@ -133,7 +133,7 @@ class TestFit:
         target = np.array([[1.75, 1.75]])
         pixel = true.project(target, 0.0)[0]
         row, column = 37, 37
-        for _ in range(60):
+        for _ in range(examples(60)):
             noisy = Points(points.pixel + lots.normal(0, 1.5, points.pixel.shape), points.ground, points.height)
             found = fit(noisy, true)
             places.append(found.camera.back_project(pixel)[0])
@@ -258,6 +258,7 @@ class TestCommand:
         run("p.csv", "--lens={name}.xml")
         assert off(read_recording("room.toml").rig.cameras[0], camera(distortion=BARREL)) < 0.01
 
+    @pytest.mark.slow
     def test_people_are_tracked_where_no_floor_is_seen(self) -> None:
         """Cameras at head height look up a little, over the back wall; points of it make the rig."""
         places = (-3.4, -3.3, 1.6), (0.2, -4.2, 1.7), (3.3, -3.4, 1.5)

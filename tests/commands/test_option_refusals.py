@@ -17,14 +17,12 @@ SCENE = "--size=64,48 --area=0,0,1,1 --frame-rate=5 -o q.toml"
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the command is called: a rig, a run, an empty run, a film, matrices and points."""
+    """Where the command is called: a rig, a run, an empty run, a film and points."""
     (tmp_path / "other").mkdir()
     write_rig(tmp_path)
     write_small_run(tmp_path / "run.h5")
     write_empty_run(tmp_path / "other" / "empty.h5")
     film(tmp_path / "film.avi", tmp_path / "plain.avi")
-    for name in ("a.txt", "other/a.txt"):
-        (tmp_path / name).write_text("60 0 32 192\n0 -60 24 324\n0 0 1 6\n")
     (tmp_path / "points.csv").write_text(POINTS)
     (tmp_path / "cam1.xml").write_text("<!-- made by stseg -->")
     monkeypatch.chdir(tmp_path)
@@ -35,8 +33,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("words", "message"),
     [
         (f"calibrate import opencvv a.txt {SCENE}", "FORMAT: found 'opencvv', expected one of"),
-        (f"calibrate import matrix {SCENE}", "FILE: found nothing, expected one calibration a camera"),
-        (f"calibrate import matrix a.txt a.txt {SCENE}", "--names: found files and folders that share their names"),
         ("calibrate page film.avi film.avi --area=0,0,1,1 -o q.html", "VIDEO: found film.avi, film.avi"),
         ("calibrate page film.avi --frame 99 --area=0,0,1,1 -o q.html", "--frame: found 99, expected a frame of the"),
         ("calibrate align rig.toml points.csv -o q.toml --metres-per-pixel 0", "--metres-per-pixel: found 0"),

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from recordings import in_ci
 
 from stseg.kernels.accelerate import COMPILED
 
@@ -138,16 +139,14 @@ compiled = pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
 @pytest.mark.parametrize(
     ("what", "sent"),
     [
-        pytest.param("in_a_kernel", TERMINATED, marks=compiled),
         pytest.param("in_a_kernel", INTERRUPTED, marks=compiled),
         pytest.param("compiling", TERMINATED, marks=compiled),
-        pytest.param("writing_a_run", INTERRUPTED, marks=compiled),
         ("calling_back", TERMINATED),
-        ("going_on_after_a_callback", TERMINATED),
-        ("failing_of_it", TERMINATED),
         ("leaving_a_thread", INTERRUPTED),
-        ("ending_slowly", TERMINATED),
         ("refusing_to_end", INTERRUPTED),
+        pytest.param("in_a_kernel", TERMINATED, marks=[compiled, pytest.mark.slow]),
+        pytest.param("writing_a_run", INTERRUPTED, marks=[compiled, pytest.mark.slow]),
+        *in_ci(*((what, TERMINATED) for what in ("going_on_after_a_callback", "failing_of_it", "ending_slowly"))),
     ],
 )
 def test_a_signal_ends_a_command_in_time(what: str, sent: tuple[signal.Signals, int, str], tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 import recordings
 from arrivals import FRAMES, StandIn, arrive, films, meanwhile, write_pieces
 from films import write_at_rate
-from recordings import COMMAND, PLACES, assert_same, compiled_only, filmed_rig, run_words, started
+from recordings import COMMAND, PLACES, assert_same, compiled_only, filmed_rig, in_ci, run_words, started
 from refusals import Command
 from run_files import table_of, trajectory_of
 from scenes import walkers
@@ -141,7 +141,7 @@ def test_the_run_file_keeps_every_line_of_the_live_table(live: Path) -> None:
         np.testing.assert_allclose(written[name], kept[name], atol=6e-4, rtol=0)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", in_ci(signal.SIGINT, signal.SIGTERM))
 def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2)

@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import pytest
 from attacks import write_rig
-from recordings import COMMAND, OPTIONS, assert_same, compiled_only, process, track, write_recording
+from recordings import COMMAND, OPTIONS, assert_same, compiled_only, in_ci, process, track, write_recording
 from refusals import Command
 from run_files import write_small_run
 
@@ -60,7 +60,7 @@ def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFix
     ]
 
 
-@pytest.mark.parametrize("code", [errno.ENOLCK, pytest.param(errno.ENOSYS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("code", [errno.ENOLCK, *in_ci(errno.ENOSYS)])
 def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
     rig = write_recording(tmp_path)
     assert track(rig, tmp_path / "locked.h5", "--frames", "0:8") == 0

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recordings import in_ci
 from refusals import refused
 from scenes import CONFIG, box_frame_sets, mask_frame_sets, room, walkers
 
@@ -90,7 +91,7 @@ def assert_equal(one: Run, other: Run) -> None:
             np.testing.assert_array_equal(x.log_odds, y.log_odds)
 
 
-@pytest.mark.parametrize("tracker", ["cut", "frames", "kalman"])
+@pytest.mark.parametrize("tracker", ["cut", *in_ci("frames", "kalman")])
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_three_walkers_are_three_tracks(kind: str, tracker: str) -> None:
     done = whole(kind, tracker)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis.strategies import integers, sampled_from
-from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, process, run_words, started, track
+from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, in_ci, process, run_words, started, track
 from refusals import Command
 from scenes import walkers
 from strategies import examples
@@ -99,9 +99,7 @@ print(kills)
     assert [path.name for path in night.parent.iterdir()] == [night.name]
 
 
-@pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), *in_ci((signal.SIGTERM, 143))])
 def test_a_signal_ends_a_run_cleanly(
     rig_path: Path, undisturbed: Path, night: Path, number: signal.Signals, status: int
 ) -> None:
@@ -308,6 +306,7 @@ def test_two_runs_keep_off_one_output(rig_path: Path, night: Path, refusal: Comm
     assert running.returncode == 0
 
 
+@pytest.mark.slow
 def test_a_full_disk_loses_no_segment(
     rig_path: Path, undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -338,7 +337,7 @@ def _mount(folder: Path, size: str) -> bool:
     return done.returncode == 0
 
 
-@pytest.mark.parametrize(("volume", "least", "most"), [("none", 1.0, 1.0), ("tracks", 0.1, 0.99)])
+@pytest.mark.parametrize(("volume", "least", "most"), [("none", 1.0, 1.0), *in_ci(("tracks", 0.1, 0.99))])
 def test_the_volume_is_kept_where_it_is_asked_for(
     rig_path: Path, undisturbed: Path, night: Path, volume: str, least: float, most: float
 ) -> None:

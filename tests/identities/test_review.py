@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from browser import CHROMIUM, chromium
+from recordings import in_ci
 from refusals import refused
 from run_files import table_of, write_small_run
 
@@ -110,7 +111,7 @@ def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys:
     assert rows["x"][(rows["frame"] == 15) & (rows["id"] == 2)] == pytest.approx(0.15)
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 5))])
+@pytest.mark.parametrize("seed", [0, *in_ci(1, 2, 3, 4)])
 def test_every_answer_to_every_question_is_accepted(tmp_path: Path, seed: int) -> None:
     """Tracks that begin, end, meet and pass on to others anywhere."""
     lots = np.random.default_rng(seed)

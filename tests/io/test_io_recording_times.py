@@ -60,6 +60,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return track(write_films(folder, [Film(regular(FRAMES))] * CAMERAS), *SHORT)
 
 
+@pytest.mark.slow
 def test_files_of_a_piece_each_make_the_same_tracks(whole: Run, tmp_path: Path) -> None:
     """Six files a camera, with borders at other frames than segments and other cameras."""
     borders = ((10,) * 6, (5, 20, 3, 17, 14, 1), (30, 2, 7, 7, 7, 7))

@@ -15,7 +15,7 @@ from unittest.mock import Mock
 import h5py
 import numpy as np
 import pytest
-from recordings import assert_same
+from recordings import assert_same, in_ci
 from refusals import refused
 from run_files import (
     CONFIG,
@@ -202,9 +202,7 @@ def interruptible() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("interruptible")
-@pytest.mark.parametrize(
-    "step", [0, 3, 50, 110, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 10, 30, 70, 90, 100))]
-)
+@pytest.mark.parametrize("step", [0, 50, 110, *in_ci(1, 3, 10, 30, 70, 90, 100)])
 def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     steps = iter(range(1000))
     patch_file(monkeypatch, lambda _: signal.raise_signal(signal.SIGINT) if next(steps) == step else None)
@@ -301,9 +299,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: py
     refused(OutputError, "Permission denied", write_small_run, tmp_path / "night.h5")
 
 
-@pytest.mark.parametrize(
-    "room", [0, 8000, 20000, *(pytest.param(k, marks=pytest.mark.slow) for k in (100, 3000, 12000, 16000))]
-)
+@pytest.mark.parametrize("room", [0, 8000, 20000, *in_ci(100, 3000, 12000, 16000)])
 def test_a_full_disk_is_told_and_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int
 ) -> None:

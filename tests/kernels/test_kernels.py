@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numba.core.caching import NullCache
-from recordings import process, started
+from recordings import in_ci, process, started
 from refusals import refused
 
 from stseg.arrays import Floats, Ints
@@ -129,14 +129,14 @@ def damaged(file: Path, kind: str) -> None:
         os.chown(file, 12345, -1)
 
 
-RARER = ("empty", "nbi"), ("flipped", "nbc"), ("writable", "nbi")
-
-
 @COMPILED
 @pytest.mark.skipif(sys.platform == "win32", reason="no owners and modes of files")
 @pytest.mark.parametrize(
     ("kind", "files"),
-    [("empty", "nbc"), ("forged", "nbi"), ("owned", "nbc"), *(pytest.param(*k, marks=pytest.mark.slow) for k in RARER)],
+    [
+        ("forged", "nbi"),
+        *in_ci(("empty", "nbi"), ("empty", "nbc"), ("flipped", "nbc"), ("writable", "nbi"), ("owned", "nbc")),
+    ],
 )
 def test_files_of_the_cache_are_used_as_this_user_wrote_them(
     cached: Path, tmp_path: Path, kind: str, files: str

@@ -188,6 +188,7 @@ def test_people_alike_leave_the_least_spread_and_are_forgotten() -> None:
     assert learned_body([*small, *[sized([], [])] * 400], config).height_mean == pytest.approx(1.7, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_run_among_children_learns_their_height() -> None:
     rig = room()
     standing = {"children": [(-0.9, 0.4, 1.2), (0.6, -0.5, 1.15)], "adults": [(-0.9, 0.4, 1.72), (0.6, -0.5, 1.68)]}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import compiled_only
+from recordings import compiled_only, in_ci
 from refusals import refused
 from scenes import boxes, found, people, room
 from strategies import examples
@@ -141,13 +141,13 @@ def switches(name: str, kind: str, stop: int) -> int:
 
 
 @compiled_only
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in SCENES])
+@pytest.mark.parametrize("name", in_ci(*SCENES))
 def test_nobody_is_taken_for_somebody_else_from_boxes(name: str) -> None:
     assert switches(name, "boxes", NAMED[name].frames) == 0
 
 
 @compiled_only
-@pytest.mark.parametrize("name", ["crossing", pytest.param("border", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["crossing", *in_ci("border")])
 def test_nobody_is_taken_for_somebody_else_from_silhouettes(name: str) -> None:
     """The first six seconds, in which people cross."""
     assert switches(name, "pixels", 60) == 0
