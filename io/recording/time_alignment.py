@@ -103,8 +103,8 @@ def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> Ti
             notes.setdefault(note, []).append(camera.name)
         if trusted is not None:
             frame_at_tick.append(nearest_frames(trusted.position, trusted.period))
-            if len(gaps := _gaps(frame_at_tick[-1])):
-                notes.setdefault(f"no image of frames {_ranges(gaps)}: lost or damaged?", []).append(camera.name)
+            if missing := missing_images(frame_at_tick[-1]):
+                notes.setdefault(missing, []).append(camera.name)
         else:
             by_place = camera.source.source.starts or camera.damage
             frame_at_tick.append(nearest_frames(camera.counted, 1.0) if by_place else None)
@@ -193,6 +193,12 @@ def _damage(path: Path, lost: Ints | None) -> str:
     if lost is None:
         return f"{path.name} is damaged, and its index does not say where: later frames are shown too early"
     return f"{path.name} is damaged: frames {_ranges(lost)} are lost, and the view is blind there"
+
+
+def missing_images(frame_at_tick: Ints | None) -> str:
+    """The frames that a camera lost, as a message; empty where it has all, or lost single ones."""
+    gaps = _gaps(frame_at_tick)
+    return f"no image of frames {_ranges(gaps)}: lost or damaged?" if len(gaps) else ""
 
 
 def _gaps(frame_at_tick: Ints | None) -> Ints:

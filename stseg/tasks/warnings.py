@@ -10,6 +10,7 @@ from stseg.arrays import Floats, Ints, Rows
 from stseg.errors import InputError
 from stseg.io.config_file import parse_config
 from stseg.io.recording.recording import Recording
+from stseg.io.recording.time_alignment import missing_images
 from stseg.io.runfile.runs import Run
 from stseg.reporting.run_statistics import ground_by_views
 from stseg.tasks.sources import body_height, recording_warnings, summarise_sources
@@ -33,6 +34,7 @@ def run_warnings(run: Run) -> list[str]:
     return [
         *_emptiness(run),
         *source_warnings(run.recording),
+        *_missing_images(run.recording),
         *track_warnings(run.frame_rate, run.trajectory),
         *explained_by_swap(
             run.recording,
@@ -82,6 +84,13 @@ def source_warnings(recording: Recording) -> list[str]:
         return recording_warnings(recording, summarise_sources(recording))
     except InputError:
         return scene_warnings(recording.rig, body_height(recording))
+
+
+def _missing_images(recording: Recording) -> list[str]:
+    """One sentence for each camera that lost frames; gaps between files that `starts` places are no loss."""
+    streams = zip(recording.rig.cameras, recording.sources, strict=True)
+    found = [(view.name, missing_images(one.frame_at_tick)) for view, one in streams if not one.source.starts]
+    return [f"{name}: {missing}" for name, missing in found if missing]
 
 
 def rig_warnings(run: Run) -> list[str]:

@@ -7,13 +7,16 @@ import pytest
 from films import regular, write_at_rate, write_stamped
 from recordings import blank_recording
 from refusals import refused
+from run_files import small_recording, write_small_run
 
 from stseg.arrays import Bytes
 from stseg.errors import SourceError
 from stseg.io.recording.aligned_stream import index_streams, require_own_sources
 from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.recording.video.avi_index import lost_frames
+from stseg.io.runfile.runs import read_run
 
 FRAMES, SIZE = 600, (48, 32)
 NOISE = np.random.default_rng(1).integers(0, 40, (SIZE[1], SIZE[0], 3))
@@ -61,6 +64,13 @@ def test_lost_frames_are_named_and_time_goes_on(suffix: str, tmp_path: Path) -> 
     (whole,) = read_camera(recording, 0, [FRAMES - 5], streams)
     assert isinstance(late, np.ndarray) and isinstance(whole, np.ndarray)
     assert np.abs(whole.astype(int) - late).mean() < 2
+
+
+def test_lost_frames_are_a_warning_of_the_run(tmp_path: Path) -> None:
+    shown = np.array([0, 1, -1, 3, -1, -1, -1, 7])
+    recording = with_alignment(small_recording(tmp_path), [shown, None])
+    run = read_run(write_small_run(tmp_path / "run.h5", recording=recording))
+    assert [one for one in run.warnings if "image" in one] == ["left: no image of frames 4 to 6: lost or damaged?"]
 
 
 def test_one_file_of_two_cameras_is_refused(tmp_path: Path) -> None:
