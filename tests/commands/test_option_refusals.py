@@ -8,6 +8,7 @@ from attacks import film, write_rig
 from refusals import Command, refused
 from run_files import write_empty_run, write_small_run
 
+from stseg.arrays import Floats
 from stseg.errors import CalibrationError
 from stseg.geometry import Grid, Rig
 
@@ -57,13 +58,12 @@ def test_options_are_refused(folder: Path, words: str, message: str, refusal: Co
 
 
 @pytest.mark.parametrize(
-    ("ground", "vertical", "names", "message"),
+    ("ground", "vertical", "message"),
     [
-        (np.zeros((1, 3, 3)), np.zeros((2, 3)), (), r"found arrays of \(1, 3, 3\) and \(2, 3\) for 2 cameras"),
-        (np.zeros((2, 3, 3)), np.zeros((2, 4)), (), r"found arrays of \(2, 3, 3\) and \(2, 4\) for 2 cameras"),
-        (np.zeros((2, 3, 3)), np.zeros((2, 3)), ("a", "a"), "names: found a, a, expected 2 different names"),
+        (np.zeros((1, 3, 3)), np.zeros((2, 3)), r"found arrays of \(1, 3, 3\) and \(2, 3\) for 2 cameras"),
+        (np.zeros((2, 3, 3)), np.zeros((2, 4)), r"found arrays of \(2, 3, 3\) and \(2, 4\) for 2 cameras"),
     ],
 )
-def test_arrays_of_rigs_are_refused(ground: object, vertical: object, names: tuple[str, ...], message: str) -> None:
-    call = Rig.from_homographies
-    refused(CalibrationError, message, call, ground, vertical, [(64, 48)] * 2, Grid((0, 1), (0, 1)), 5.0, names=names)  # type: ignore[arg-type]
+def test_arrays_of_rigs_are_refused(ground: Floats, vertical: Floats, message: str) -> None:
+    sizes, grid = [(64, 48)] * 2, Grid((0, 1), (0, 1))
+    refused(CalibrationError, message, Rig.from_homographies, ground, vertical, sizes, grid, 5.0)

@@ -11,7 +11,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
-from recordings import compiled_only
+from recordings import compiled_only, in_ci
 
 from stseg.commands.main import COMMANDS, _app
 from stseg.config import Config
@@ -29,6 +29,7 @@ sys.path.append(str(ROOT / "tools"))
 import configuration_page  # noqa: E402
 
 DOCS = ROOT / "docs"
+LONG = DOCS / "python.md"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
 DEVELOPMENT = DOCS / "development"
 DEVELOPMENT_WORDS = 7_000
@@ -216,7 +217,9 @@ def folder(rig_path: Path, undisturbed: Path, tmp_path_factory: pytest.TempPathF
 
 
 @compiled_only
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page", [*(p for p in PAGES if blocks(p, "python") and p != LONG), *in_ci(LONG)], ids=lambda page: page.name
+)
 def test_python_blocks_run(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MPLBACKEND", "agg")
