@@ -23,8 +23,6 @@ def read_bytes(path: Path, most: int = limits.TEXT_FILE) -> bytes:
     """
     with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
         state = os.fstat(file.fileno())
-        if stat.S_ISDIR(state.st_mode):
-            raise IsADirectoryError(21, "Is a directory")
         if not stat.S_ISREG(state.st_mode):
             raise ValueError("what is no regular file")
         data = file.read(min(most, max(state.st_size, limits.LINE)) + 1)  # so much memory is taken at once

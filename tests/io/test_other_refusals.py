@@ -8,12 +8,14 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import cv2
+import h5py
 import numpy as np
 import pytest
 from attacks import film
 from refusals import refused
 
-from stseg.errors import FormatError, OutputError, SourceError
+from stseg.errors import ConfigError, FormatError, OutputError, SourceError
+from stseg.io.config_file import read_config
 from stseg.io.exports.archive import ARCHIVES
 from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.live_stream import FFmpegCapture
@@ -26,6 +28,8 @@ from stseg.io.runfile.runs import read_run
 from stseg.io.toml import parse_toml
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
+from stseg.io.untrusted.bounded_files import read_bytes
+from stseg.io.untrusted.safe_hdf5 import read_whole, require_sound_heaps
 from stseg.io.untrusted.values import is_file_name, is_name, is_title
 from stseg.records.tables import TRAJECTORY
 
@@ -42,6 +46,11 @@ def test_names_of_three_kinds(question: Callable[[object], bool], wrong: list[ob
     assert not any(map(question, wrong)) and question("a b")
 
 
+_BEGIN, _SEVEN = "GCOL\1\0\0\0", "\0" * 7
+HEAPS = f"{_BEGIN}\x40{_SEVEN}\1{_SEVEN}\x10{_SEVEN}{_BEGIN}{_SEVEN}\0{_SEVEN}\0\x10{_SEVEN}"
+"""A heap of an object, in which another one begins, and of 16 free bytes."""
+
+
 @pytest.mark.parametrize(
     ("kind", "call", "message"),
     [
@@ -50,6 +59,13 @@ def test_names_of_three_kinds(question: Callable[[object], bool], wrong: list[ob
         (SourceError, lambda at: read_video_size(at), "no regular file, expected a video"),
         (SourceError, lambda at: read_video_size(text(at / "a.avi", "")), "no frame that decodes"),
         (SourceError, lambda at: read_video_size(text(at / "a.avi", "\ufeff#EXTM3U")), "a text, such as a playlist"),
+        (OSError, lambda at: read_bytes(at), "Is a directory"),
+        (ValueError, lambda at: read_bytes(pipe(at / "a")), "what is no regular file"),
+        (ValueError, lambda at: read_bytes(text(at / "a", "abc"), 2), "more than 2 bytes"),
+        (ValueError, lambda at: require_sound_heaps(text(at / "a", HEAPS)), "a global heap at byte 32 inside of anoth"),
+        (ValueError, lambda at: read_whole(unwritten(at / "a")), "80000 bytes declared, 0 stored"),
+        (ConfigError, lambda _: read_config(None, ("detection.hidden_visibility=1",)), "0 to below full_visibility"),
+        (ConfigError, lambda _: read_config(None, ("body.height_mean=0.01",)), "more than two standard deviations"),
         (OSError, lambda _: FFmpegCapture("file:///etc/passwd", 1.0), "no address of a live stream"),
         (OSError, lambda _: FFmpegCapture("rtsp://127.0.0.1:9/x", 0.1), "no stream that FFmpeg opens"),
         (ValueError, lambda at: LiveTable(at / "l.csv", 5.0, 0).append(np.zeros(1, TRAJECTORY)), "that is not open"),
@@ -65,6 +81,15 @@ def test_calls_are_refused(tmp_path: Path, kind: type[Exception], call: Callable
 def text(path: Path, content: str) -> Path:
     path.write_text(content)
     return path
+
+
+def pipe(path: Path) -> Path:
+    os.mkfifo(path)
+    return path
+
+
+def unwritten(path: Path) -> h5py.Dataset:
+    return h5py.File(path, "w").create_dataset("a", (80_000,), "u1")
 
 
 def link(path: Path, target: Path) -> Path:
