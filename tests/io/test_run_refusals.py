@@ -52,6 +52,8 @@ LONG = "x" * 9999
         ("/provenance/shown/0", [-2], "provenance", "shown of camera left: no frames by tick"),
         ("/trajectory", "twice", "trajectory", "/trajectory: found a track twice in a frame"),
         ("/entry/occupancy/frame", [10, 11, 12, 13, 14, 17], "require_fit", "/trajectory, frame: found frame 15"),
+        ("/entry/occupancy/frame", [10, 11, 12, 13, 14, 14], "frames", "frame: found numbers that do not rise"),
+        ("/tracks", "twice", "require_fit", "/tracks: found a track that ends before it begins, or twice"),
         ("/entry/occupancy/x", np.full(6, np.inf), "frames", "occupancy/x: found a coordinate that is not finite"),
         ("/entry/occupancy/label", GROWING, "frames", r"label: frames of \(3, 4, 6\) in chunks of \(65, 3, 4, 6\)"),
         ("/entry/occupancy/views", np.zeros(9**5, "u1"), "frames", "."),
@@ -101,6 +103,14 @@ def test_runs_that_cannot_be_corrected_are_refused(run_path: Path, name: str, va
 
     refused(FormatError, message, correct)
     assert not run_path.with_name("n.h5").exists()
+
+
+def test_titles_print_without_escape_codes(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        put(file, "/entry/title", "\x1b[31m")
+        put(file, "/provenance@created", "\x1b[31m")
+    run = read_run(run_path)
+    assert (run.scene, run.provenance.created) == (r"\x1b[31m", r"\x1b[31m")
 
 
 @pytest.mark.parametrize(
