@@ -190,14 +190,6 @@ def tracklet(chain: int, path: Path) -> Tracklet:
     return made
 
 
-def test_velocity_is_that_of_the_end() -> None:
-    turning = tracklet(1, {0: (0.0, 0.0), 1: (0.1, 0.0), 3: (0.3, 0.0), 4: (0.4, 0.0), 5: (0.5, 0.0)})
-    for frame in range(6, 12):
-        turning.add(frame, 0, np.array([0.5, 0.2 * (frame - 5)]))
-    np.testing.assert_allclose(turning.velocity(), [0.0, 0.2])
-    assert not tracklet(1, {3: (1.0, 1.0)}).velocity().any()
-
-
 def test_a_gap_is_filled_in_order_and_on_the_line() -> None:
     gappy = tracklet(1, {2: (0.0, 0.0), 6: (0.4, 0.8)})
     np.testing.assert_allclose(gappy.between(3), [0.1, 0.2])

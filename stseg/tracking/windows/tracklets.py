@@ -55,13 +55,6 @@ class Tracklet:
         self.blobs += later.blobs
         self.ground += later.ground
 
-    def velocity(self) -> Floats:
-        """Metres per frame over up to four steps at the end, float64 (2,)."""
-        frames, ground = self.frames[-5:], self.ground[-5:]
-        if len(frames) < 2:
-            return np.zeros(2)
-        return np.asarray((ground[-1] - ground[0]) / (frames[-1] - frames[0]))
-
 
 def form_tracklets(blobs: Sequence[Blobs], first: int, config: TrackingConfig) -> list[Tracklet]:
     """The tracklets of a window, which begins with frame `first`.
