@@ -23,6 +23,9 @@ from stseg.config import BodyConfig, ErrorRateConfig
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import People
 
+_LARGEST_SPREAD = 0.45
+"""Largest standard deviation of a population that is learned, share of its mean: more is not one kind of body."""
+
 
 class PopulationEstimate:
     """Accumulated sizes of people.
@@ -56,9 +59,9 @@ class PopulationEstimate:
         return replace(
             first,
             height_mean=height,
-            height_spread=height_spread,
+            height_spread=min(height_spread, _LARGEST_SPREAD * height),
             width_mean=wide * height,
-            width_spread=max(spread * height, first.width_spread),
+            width_spread=min(max(spread * height, first.width_spread), _LARGEST_SPREAD * wide * height),
         )
 
     def skip_frame(self) -> None:

@@ -7,7 +7,11 @@ bodies, B of them missing and R of them background on the rim, the share
 
     w = (B - m A) / R,    within 0 and 1,
 
-leaves as much background as a segmentation misses at the usual rate m (`pixel_miss_rate`). Whole silhouettes have
+leaves as much background as a segmentation misses at the usual rate m (`pixel_miss_rate`). Where rims cannot explain
+what is missing, the masks are torn: log-odds are those of the view's own rates then, of its missing pixels off the rim
+and of foreground away from people. A torn mask holds little foreground that is no person, so what there is says more.
+
+Whole silhouettes have
 background within the outline of a pillar, too: a limb stands beside it. So of each row of an outline as many pixels
 are missing as it has more of background within than of foreground beside, up to half its width on either side.
 
@@ -25,7 +29,7 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
-from stseg.bodies.outlines import WHOLE_SHARE, Spans
+from stseg.bodies.outlines import WHOLE_SHARE, Spans, paint_outlines
 from stseg.bodies.views import PixelView, View, ViewObservation
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.kernels.accelerate import kernel, part
@@ -36,6 +40,8 @@ _PRIOR_WEIGHT = 0.25
 """Weight of the first guess, that nothing is withdrawn: seconds of one person in any view."""
 _MEAN_WEIGHT = 2.0
 """Weight of the mean of all views in each of them: seconds of one person."""
+_LEAST_CLUTTER = 0.01
+"""Least clutter of torn masks, 0..1."""
 
 
 class RimEstimate:
@@ -58,13 +64,17 @@ class RimEstimate:
     ----------
     shares : (view, 3)
         Weight, and weighted sums of the shares of bodies that are missing, and background on the rim; seconds.
+    clutter : (view, 2)
+        Weight, and weighted sums of the share of pixels away from people that are foreground; seconds.
     """
 
     def __init__(
         self, views: int, body: BodyConfig, config: DetectionConfig, frame_rate: float, learning: ErrorRateConfig
     ) -> None:
-        self._body, self._miss, self._evidence = body, config.pixel_miss_rate, learning.minimum_evidence
+        self._body, self._evidence = body, learning.minimum_evidence
+        self._miss, self._clutter = config.pixel_miss_rate, config.pixel_clutter_rate
         self.shares = Forgetting((views, 3), frame_rate, learning.memory)
+        self.clutter = Forgetting((views, 2), frame_rate, learning.memory)
 
     @property
     def withdrawn(self) -> Floats:
@@ -72,25 +82,40 @@ class RimEstimate:
         weight, missing, rim = self.shares.with_prior(_MEAN_WEIGHT, self._mean()).T
         return np.asarray(((missing - self._miss * weight) / rim).clip(0.0, 1.0))
 
+    @property
+    def torn(self) -> Floats:
+        """Miss and clutter rates of each view whose masks are torn, of all others the usual ones, float64 (view, 2)."""
+        weight, missing, rim = self.shares.with_prior(_MEAN_WEIGHT, self._mean()).T
+        miss = (missing - rim) / (weight - rim)
+        count, found = self.clutter.with_prior(_PRIOR_WEIGHT, np.array([1.0, self._clutter])).T
+        clutter = np.clip(found / count, _LEAST_CLUTTER, self._clutter)
+        rates = np.column_stack([miss, clutter])
+        return np.where(miss[:, None] > self._miss, rates, [self._miss, self._clutter])
+
     def _mean(self) -> Floats:
         """Shares of all views and the first guess for one second of one person, float64 (3,)."""
         total = self.shares.sums.sum(0) + _PRIOR_WEIGHT * np.array([1.0, self._miss, self._miss])
         return np.asarray(total / total[0])
 
     def applied(self, observations: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
-        """The observations of all views without the withdrawn share of their rims."""
+        """The observations of all views without the withdrawn share of their rims, by the rates of torn masks."""
+        usual = self._miss, self._clutter
         return [
-            None if view is None else without_rim(view, share)
-            for view, share in zip(observations, self.withdrawn.tolist(), strict=True)
+            None if view is None else with_rates(without_rim(view, share), usual, (miss, clutter))
+            for view, share, (miss, clutter) in zip(
+                observations, self.withdrawn.tolist(), self.torn.tolist(), strict=True
+            )
         ]
 
     def skip_frame(self) -> None:
         """Defer the weight of a frame that is not measured to the next one."""
         self.shares.skip_frame()
+        self.clutter.skip_frame()
 
     def learn(self, people: People, views: Sequence[View], observations: Sequence[ViewObservation | None]) -> None:
         """Count one frame."""
         self.shares.forget()
+        self.clutter.forget()
         for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
             if isinstance(view, PixelView) and observation is not None and len(people):
                 trusted = people.evidence - people.view_evidence[k] >= self._evidence
@@ -100,6 +125,20 @@ class RimEstimate:
                 _fill_counts(first, spans, observation.raster, counts)
                 counted = trusted & (counts[:, 0] > WHOLE_SHARE * whole)
                 self.shares.add(self.shares.seconds((counts[counted] / counts[counted, :1]).sum(0)), k)
+                self.clutter.add(
+                    self.clutter.seconds(np.array([1.0, _clutter_of(first, spans, observation.raster)])), k
+                )
+
+
+def with_rates(observation: ViewObservation, usual: tuple[float, float], rates: tuple[float, float]) -> ViewObservation:
+    """An observation of pixels by other rates of misses and clutter than the usual ones: log-odds of one likelihood."""
+    if rates == usual:
+        return observation
+    (miss, clutter), ratio = usual, np.exp(observation.raster)
+    share = (ratio * (1.0 - clutter) - miss) / (1.0 - 2.0 * miss + ratio * (1.0 - 2.0 * clutter))
+    miss, clutter = rates
+    body, empty = (wrong + share * (right - wrong) for wrong, right in ((miss, 1 - miss), (1 - clutter, clutter)))
+    return replace(observation, raster=np.log(body / empty).astype(np.float32))
 
 
 def without_rim(observation: ViewObservation, withdrawn: float) -> ViewObservation:
@@ -130,6 +169,13 @@ def _fill_without_rim(raster: Singles, kept: np.float32, weaker: Singles) -> Non
         for u in range(columns):
             value = raster[v, u]
             weaker[v, u] = value * kept if value < 0 and _on_rim(raster, v, u) else value
+
+
+def _clutter_of(first: Ints, spans: Spans, raster: Singles) -> float:
+    """Share of the pixels outside all outlines (n,) that are foreground."""
+    owner = np.full(raster.shape, -1, np.int16)
+    paint_outlines(np.arange(len(first)), first, spans, owner)
+    return float((raster[owner < 0] > 0).mean()) if (owner < 0).any() else 0.0
 
 
 @kernel

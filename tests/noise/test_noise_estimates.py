@@ -27,7 +27,7 @@ from stseg.io.recording.rigs import parse_rig
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.population_estimate import PopulationEstimate
-from stseg.noise.rim_estimate import RimEstimate, without_rim
+from stseg.noise.rim_estimate import RimEstimate, with_rates, without_rim
 from stseg.records.people import People
 
 RATE = 5.0
@@ -172,6 +172,11 @@ def test_means_and_spreads_by_the_formulas() -> None:
     assert after.width_spread >= body.width_spread
 
 
+def test_the_spread_of_a_population_has_a_bound() -> None:
+    after = learned_body([sized([0.6, 0.6], [0.1, 1.2])] * 400)
+    assert after.width_spread == pytest.approx(0.45 * after.width_mean)
+
+
 def test_nothing_seen_teaches_nothing() -> None:
     for frame in (sized([], []), sized([1.0], [0.2], unresolved=1.0), sized([1.0], [0.2], evidence=1.0)):
         after = learned_body([frame] * 20)
@@ -297,6 +302,28 @@ def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
     left = (missing - rims.withdrawn * rim) / weight
     np.testing.assert_allclose(left[rims.withdrawn < 1], FEW_HEIGHTS.pixel_miss_rate, atol=0.01)
     assert (rims.withdrawn > 0).any()
+
+
+def test_torn_masks_are_read_by_their_own_rates() -> None:
+    whole = seen(APART, 0)
+    bands = np.arange(room().cameras[0].size[1])[:, None] // 10 % 2
+    torn = [np.asarray(np.where(bands, 0, view), np.float32) for view in map(np.asarray, whole)]
+    usual = FEW_HEIGHTS.pixel_miss_rate, FEW_HEIGHTS.pixel_clutter_rate
+    np.testing.assert_array_equal(learned_rims(APART, whole).torn, [usual] * len(whole))
+    rates = learned_rims(APART, torn, frames=100).torn
+    assert (rates[:, 0] > usual[0]).all() and (rates[:, 1] < usual[1]).all()
+
+
+@given(st.floats(0.01, 0.45), st.floats(0.01, 0.45))
+def test_log_odds_by_other_rates_are_those_of_the_likelihood(miss: float, clutter: float) -> None:
+    likelihood = np.linspace(0, 1, 21)[None]
+
+    def log_odds(m: float, b: float) -> Floats:
+        body, empty = (1 - m) * likelihood + m * (1 - likelihood), b * likelihood + (1 - b) * (1 - likelihood)
+        return np.asarray(np.log(body / empty))
+
+    found = with_rates(shown(log_odds(0.2, 0.07).astype(np.float32)), (0.2, 0.07), (miss, clutter)).raster
+    np.testing.assert_allclose(found, log_odds(miss, clutter), atol=1e-4)
 
 
 def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
