@@ -133,6 +133,8 @@ class BoxNoise:
     """
 
     spread: Floats
+    scale: float = 1.0
+    """Of offsets and tolerances: a low, long body errs by more of its height than a person (`BodyConfig.stoutness`)."""
 
     def of(self, score: Floats) -> tuple[Floats, Floats]:
         """Boxes' tolerances float64 (box, 5), and what each says by itself, nats, float64 (box,); scores are 0..1."""
@@ -140,7 +142,7 @@ class BoxNoise:
         logs = np.log(self.spread)
         spread = np.exp(logs[lower] * (1 - share[:, None]) + logs[lower + 1] * share[:, None])
         tolerance = spread / np.sqrt(EFFECTIVE_OBSERVATIONS)
-        return tolerance, EFFECTIVE_OBSERVATIONS * np.log(_sides(TOLERANCE) / _sides(tolerance)).sum(-1)
+        return tolerance * self.scale, EFFECTIVE_OBSERVATIONS * np.log(_sides(TOLERANCE) / _sides(tolerance)).sum(-1)
 
 
 def knots_of(score: Floats) -> tuple[np.ndarray, Floats]:

@@ -39,15 +39,18 @@ class BodyTable(NamedTuple):
         Pixel of each lattice point at each level; nan where the camera does not see it.
     size
         Width and height of the image, pixels.
+    breadth
+        Ratio of the radii of boxes' pillars to those of people.
     """
 
     origin: tuple[float, float]
     step: float
     pixel: Singles
     size: tuple[int, int]
+    breadth: float = 1.0
 
     @classmethod
-    def of(cls, camera: Camera, grid: Grid, step: float = 0.12, margin: float = 0.6) -> BodyTable:
+    def of(cls, camera: Camera, grid: Grid, step: float = 0.12, margin: float = 0.6, breadth: float = 1.0) -> BodyTable:
         """The table of `camera` over the grid's rectangle and `margin` metres around it."""
         x = np.arange(grid.x[0] - margin, grid.x[1] + margin + step, step)
         y = np.arange(grid.y[0] - margin, grid.y[1] + margin + step, step)
@@ -56,7 +59,7 @@ class BodyTable(NamedTuple):
         for k, level in enumerate(LEVELS):
             place, ahead = camera.project(ground, float(level))
             pixel[k] = np.where(ahead[..., None], place, np.nan)
-        return cls((float(x[0]), float(y[0])), step, pixel, camera.size)
+        return cls((float(x[0]), float(y[0])), step, pixel, camera.size, breadth)
 
     def boxes(self, ground: Floats, heights: Floats) -> Floats:
         """Boxes of pillars in this view.
@@ -117,8 +120,8 @@ def _fill_boxes(table: BodyTable, ground: Floats, heights: Floats, filled: Float
         left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
         visible = True
         for k in range(len(PROFILE)):
-            wide = math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
-            tall = math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
+            wide = table.breadth * math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
+            tall = table.breadth * math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
             visible = visible and not np.isnan(wide + tall)
             left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
             top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)

@@ -86,12 +86,13 @@ class View:
     """Pillars of a ground lattice in one camera."""
 
     def __init__(
-        self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig
-    ) -> None:
+        self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig,
+        breadth: float = 1.0,
+    ) -> None:  # fmt: skip
         self.camera, self.grid = camera, grid
         self.config, self.body = config, body
         self.centre = camera.centre[:2]
-        self.table = BodyTable.of(camera, grid)
+        self.table = BodyTable.of(camera, grid, breadth=breadth)
         self.bodies = self.table.boxes(lattice_ground, np.asarray(body.heights))
         self.step = _raster_step(self.bodies, camera.size)
         width, height = camera.size
@@ -137,7 +138,7 @@ class BoxView(View):
     def __init__(
         self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig
     ) -> None:
-        super().__init__(camera, grid, lattice_ground, config, body)
+        super().__init__(camera, grid, lattice_ground, config, body, body.breadth)
         width, height = map(float, camera.size)
         inside = np.zeros(self.bodies.shape[:2])
         for row, bodies in zip(inside, self.bodies, strict=True):

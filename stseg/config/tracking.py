@@ -12,6 +12,8 @@ from stseg.config.ranges import Settings, at_least, not_negative, positive, requ
 
 _TALLEST = 2.2
 """Metres; taller pillars reach above most grids."""
+_COMMON_HEIGHT, _COMMON_WIDTH = 1.70, 0.42
+"""Means of people, metres (HW12)."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +119,11 @@ class BodyConfig(Settings):
     widths fall in proportion.
     """
 
-    height_mean: float = positive(1.70)
+    height_mean: float = positive(_COMMON_HEIGHT)
     """Mean height of the people recorded, metres (HW12); the first guess of what the run learns."""
     height_spread: float = positive(0.12)
     """Standard deviation of their heights, metres; the least that the run learns."""
-    width_mean: float = positive(0.42)
+    width_mean: float = positive(_COMMON_WIDTH)
     """Mean width of a body across shoulders and arms, metres; the first guess."""
     width_spread: float = positive(0.04)
     """Standard deviation of these widths, metres; the least that the run learns."""
@@ -129,6 +131,16 @@ class BodyConfig(Settings):
     """Weight of these means and spreads: seconds of one person; sizes that the run measures count beside them."""
     heights: tuple[float, ...] = (1.0, 1.25, 1.5, 1.6, 1.7, 1.8, 1.9)
     """Heights that the search for candidates tries, metres, rising."""
+
+    @property
+    def breadth(self) -> float:
+        """Ratio of the mean width to that of people."""
+        return self.width_mean / _COMMON_WIDTH
+
+    @property
+    def stoutness(self) -> float:
+        """Ratio of width by height to that of people, at least 1: greater for animals."""
+        return max(self.breadth * _COMMON_HEIGHT / self.height_mean, 1.0)
 
     def width_of(self, height: Floats) -> Floats:
         """Mean width of bodies of given heights, both metres: that of all, less in proportion for small ones."""

@@ -75,7 +75,7 @@ class Detector:
     ) -> None:
         self.config, self.body = config, body
         self._frame_rate, self._error_rates = rig.frame_rate, error_rates or ErrorRateConfig()
-        self.first_noise = BoxNoiseEstimate(self._frame_rate, self._error_rates).noise
+        self.first_noise = BoxNoiseEstimate(self._frame_rate, self._error_rates, body.stoutness).noise
         grid = rig.grid
         self.lattice_ground = lattice(grid, config.lattice_spacing)
         flat = self.lattice_ground.reshape(-1, 2)
@@ -98,7 +98,7 @@ class Detector:
         """Estimates of a session that begins: first guesses, the configured population, and no view that fails."""
         number, rate, error_rates = len(self.views), self._frame_rate, self._error_rates
         return Estimates(
-            BoxNoiseEstimate(rate, error_rates),
+            BoxNoiseEstimate(rate, error_rates, self.body.stoutness),
             BoxBiasEstimate(rate, error_rates),
             PopulationEstimate(self.body, rate, error_rates),
             RimEstimate(number, self.body, self.config, rate, error_rates),

@@ -130,7 +130,7 @@ def finished_tracks(
     if not tracker.final:
         return associated_tracks(rig, config, committed, events, appearance, image_rig, known=known)
     whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
-    return _with_boxes(whole, image_rig), whole.identity
+    return _with_boxes(whole, image_rig, config.body.breadth), whole.identity
 
 
 def associated_tracks(
@@ -139,7 +139,7 @@ def associated_tracks(
 ) -> tuple[Tracks, Ints]:  # fmt: skip
     """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
     whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints, known)
-    return _with_boxes(whole, image_rig), whole.identity
+    return _with_boxes(whole, image_rig, config.body.breadth), whole.identity
 
 
 def identity_problem(
@@ -150,6 +150,6 @@ def identity_problem(
     return IdentityProblem.of(bridged, sizes, appearance, rig.frame_rate, Border.of(rig), config, constraints)
 
 
-def _with_boxes(whole: FinalTracks, image_rig: Rig) -> Tracks:
-    tables = [BodyTable.of(camera, image_rig.grid) for camera in image_rig.cameras]
+def _with_boxes(whole: FinalTracks, image_rig: Rig, breadth: float) -> Tracks:
+    tables = [BodyTable.of(camera, image_rig.grid, breadth=breadth) for camera in image_rig.cameras]
     return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events)

@@ -47,6 +47,8 @@ class BoxNoiseEstimate:
     ----------
     frame_rate
         Frames per second.
+    scale
+        That of `BoxNoise`.
 
     Attributes
     ----------
@@ -54,8 +56,8 @@ class BoxNoiseEstimate:
         Boxes, and their squared offsets, of the lower edge on either side of the feet; both times seconds.
     """
 
-    def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
-        self._config = config
+    def __init__(self, frame_rate: float, config: ErrorRateConfig, scale: float = 1.0) -> None:
+        self._config, self._scale = config, scale
         self.offsets = Forgetting((len(SCORE_KNOTS), 6), frame_rate, config.memory)
 
     @property
@@ -78,7 +80,7 @@ class BoxNoiseEstimate:
         root = np.cbrt(squares[:, LOWER_EDGE_BELOW:])
         spread[:, LOWER_EDGE_BELOW:] = root * np.sqrt(root.sum(1, keepdims=True) / count)
         spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
-        return BoxNoise(np.minimum(spread, PRIOR_NOISE.spread))
+        return BoxNoise(np.minimum(spread, PRIOR_NOISE.spread), self._scale)
 
     def learn(
         self, explanation: Explanation, views: Sequence[View], observations: Sequence[ViewObservation | None]
@@ -86,7 +88,7 @@ class BoxNoiseEstimate:
         """Count one frame."""
         self.offsets.forget()
         for k, person, edges, score in explained_boxes(explanation, views, observations, self._config):
-            self._count(score, _squares(views[k], explanation.people, person, edges))
+            self._count(score, _squares(views[k], explanation.people, person, edges) / self._scale**2)
 
     def _count(self, score: Floats, squares: Floats) -> None:
         lower, share = knots_of(score)

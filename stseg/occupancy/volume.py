@@ -67,7 +67,7 @@ class Occupancy:
         sampling = Sampling.of(rig, config.sampling)
         self.views: Bytes = sampling.views()
         self.heights = np.asarray(body.heights)
-        self.height_mean, self.height_spread = body.height_mean, body.height_spread
+        self.height_mean, self.height_spread, self._breadth = body.height_mean, body.height_spread, body.breadth
         self.prior = cell_prior_log_odds(config)
         self._sums = [SumTable.over(region) for region in sampling.regions()]
         self._tables = CellTables(sampling.footprint)
@@ -254,7 +254,7 @@ class Occupancy:
     def _pillars_of(self, i: int) -> tuple[Singles, PillarIndex]:
         """Boxes of the pillars of all heights at all cells, float32 (height * cell, 4), and their index."""
         camera, grid = self.rig.cameras[i], self.rig.grid
-        bodies = BodyTable.of(camera, grid).boxes(self._ground, self.heights)
+        bodies = BodyTable.of(camera, grid, breadth=self._breadth).boxes(self._ground, self.heights)
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 

@@ -37,6 +37,12 @@ def test_a_box_is_that_of_the_bodys_points(view: str, x: float, y: float, height
     np.testing.assert_allclose(found, expected, rtol=0, atol=max(1.0, 0.01 * (expected[3] - expected[1])))
 
 
+def test_broad_bodies_have_broad_boxes() -> None:
+    heights = np.full(len(PLACES), 1.7)
+    common, broad = (BodyTable.of(VIEWS["low"], GRID, breadth=b).boxes_of(PLACES, heights) for b in (1.0, 2.0))
+    np.testing.assert_allclose(broad[:, 2] - broad[:, 0], 2 * (common[:, 2] - common[:, 0]), rtol=0.02)
+
+
 @given(x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(1.3, 2.0))
 def test_discs_are_rings_of_the_body(x: float, y: float, height: float) -> None:
     table, discs = TABLES["ideal"], np.empty((len(PROFILE), 6))

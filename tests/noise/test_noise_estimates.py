@@ -49,6 +49,16 @@ def test_what_is_sharper_says_more(scores: list[float]) -> None:
     np.testing.assert_allclose(more - belief, 4 * box_fit.EFFECTIVE_OBSERVATIONS * np.log(2))
 
 
+def test_stout_bodies_have_wide_tolerances_and_the_same_belief() -> None:
+    score = np.array([0.3, 0.9])
+    stout = BoxNoiseEstimate(RATE, CONFIG, BodyConfig(height_mean=0.6, width_mean=0.42).stoutness).noise.of(score)
+    for of_stout, person, ratio in zip(
+        stout, BoxNoiseEstimate(RATE, CONFIG).noise.of(score), (1.7 / 0.6, 1), strict=True
+    ):
+        np.testing.assert_allclose(of_stout, ratio * person)
+    assert BodyConfig().stoutness == BodyConfig().breadth == BodyConfig(width_mean=0.3).stoutness == 1.0
+
+
 def test_noise_begins_at_the_prior_and_forgets() -> None:
     sharpening = BoxNoiseEstimate(RATE, replace(CONFIG, memory=1.0))
     np.testing.assert_allclose(sharpening.noise.spread, PRIOR_NOISE.spread)
