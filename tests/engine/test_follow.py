@@ -257,9 +257,10 @@ def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
     assert messages.count("camera east: no pictures from rtsp://there/east") == 1
     assert messages.count("camera east: the stream is back") == 1
     assert run.frames.tolist() == list(range(40))
-    blind = run.events[run.events["kind"] == b"blind"]
+    # A busy machine may be late for the other cameras, too.
+    blind = [bytes(e["reason"]) for e in run.events if e["kind"] == b"blind" and b"camera east" in e["reason"]]
     assert len(blind) >= 1
-    assert all(re.fullmatch(rb"camera east showed nothing in \d+ of \d+ frames", row["reason"]) for row in blind)
+    assert all(re.fullmatch(rb"camera east showed nothing in \d+ of \d+ frames", reason) for reason in blind)
     assert len(run.tracks) >= 3
 
 
