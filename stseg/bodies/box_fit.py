@@ -134,7 +134,7 @@ class BoxNoise:
 
     spread: Floats
     scale: float = 1.0
-    """Of offsets and tolerances: a low, long body errs by more of its height than a person (`BodyConfig.stoutness`)."""
+    """Factor of offsets and tolerances: low, long bodies err by more of their height (`BodyConfig.stoutness`)."""
 
     def of(self, score: Floats) -> tuple[Floats, Floats]:
         """Boxes' tolerances float64 (box, 5), and what each says by itself, nats, float64 (box,); scores are 0..1."""
