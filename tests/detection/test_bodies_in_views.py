@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,16 +12,19 @@ from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, likelihoods, looking, people, rig_of, room
 from strategies import numbers
 
+import stseg
 from stseg.arrays import Flags, Floats, Singles
 from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, fill_inside, fill_match, half_square
 from stseg.bodies.outlines import outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable
 from stseg.bodies.views import PixelView, ViewObservation
+from stseg.commands.simulate import simulate
 from stseg.detection.detector import Detector
 from stseg.detection.evidence.occlusion import hiders_of
 from stseg.detection.prior import Prior
 from stseg.detection.problem import BoxEvidence, no_rows
+from stseg.io.track_csv import read_tracks_csv
 from stseg.records.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
@@ -186,3 +190,10 @@ def test_a_near_body_is_no_small_one_at_the_far_border(place: tuple[float, float
     near_body = people((*place, 1.75))
     found = detector_for(1).explain(likelihoods(room().cameras[:1], near_body), no_tracks()).people.ground
     assert np.hypot(*(found - near_body[:, :2]).T).max() < 0.5
+
+
+def test_animals_are_found_by_boxes(tmp_path: Path) -> None:
+    simulate(tmp_path / "a", scene="animals", seconds=3.0, size="240,180")
+    run = stseg.track(tmp_path / "a" / "rig_boxes.toml", volume="none")
+    scores = stseg.evaluate(run.trajectory, read_tracks_csv(tmp_path / "a" / "truth.csv"), frames=run.frames)
+    assert scores.moda is not None and scores.moda > 95

@@ -15,7 +15,6 @@ from refusals import refused
 from scipy.spatial.distance import pdist
 from strategies import BARREL, cameras, examples, numbers
 
-import stseg
 from stseg.arrays import Floats
 from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError, OutputError
@@ -455,10 +454,3 @@ def test_the_rig_says_what_animals_are(tmp_path: Path) -> None:
     body = read_recording(tmp_path / "a" / "rig_masks.toml").body
     assert (body.height_mean, body.width_mean) == (0.6, 0.725)
     assert read_recording(tmp_path / "b" / "rig.toml").body.height_mean is None
-
-
-def test_animals_are_found_by_boxes(tmp_path: Path) -> None:
-    simulate(tmp_path / "a", scene="animals", seconds=3.0, size="240,180")
-    run = stseg.track(tmp_path / "a" / "rig_boxes.toml", volume="none")
-    scores = stseg.evaluate(run.trajectory, read_tracks_csv(tmp_path / "a" / "truth.csv"), frames=run.frames)
-    assert scores.moda is not None and scores.moda > 95
