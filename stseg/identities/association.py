@@ -109,7 +109,7 @@ class IdentityProblem:
         Constraints are pairs of rows; those of which a row is not chosen are left out. The size evidence of rows that
         are `left_out`, int64 (m,), counts for those that stand in for them, int64 (m,).
         """
-        number = np.argsort(self.observations.order)
+        number = self.observations.number
         part = self.observations.at(np.sort(number[chosen]), number[left_out], number[stand_in])
         place = np.full(len(number), -1)
         place[part.order] = np.arange(len(part.order))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -82,13 +83,22 @@ class Observations:
         np.add.at(information, head, self.information)
         return replace(self, precision=precision, information=information)
 
+    @cached_property
+    def number(self) -> Ints:
+        """int64 (n,): the observation of each row of the trajectory."""
+        return np.argsort(self.order)
+
+    @cached_property
+    def _frame(self) -> Ints:
+        """int64 (n,): index of the frame of each observation."""
+        return np.repeat(np.arange(len(self.seconds)), np.diff(self.start))
+
     def at(self, chosen: Ints, left_out: Ints, stand_in: Ints) -> Observations:
         """Some of them alone, int64 (k,), rising; people of whom none was observed before are new there.
 
         The size evidence of those that are left out, int64 (m,), counts for chosen ones that stand in for each, (m,).
         """
-        frame = np.repeat(np.arange(len(self.seconds)), np.diff(self.start))[chosen]
-        frames, start = np.unique(frame, return_index=True)
+        frames, start = np.unique(self._frame[chosen], return_index=True)
         place = np.full(len(self.order) + 1, -1)  # the last is that of no observation
         place[chosen] = np.arange(len(chosen))
         previous = place[self.previous[chosen]]

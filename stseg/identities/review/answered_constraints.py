@@ -95,6 +95,7 @@ class RowsOfTracks:
     def __init__(self, rows: Rows, frame_rate: float) -> None:
         self.rows, self.frame_rate, self.reach = rows, frame_rate, _SEARCH_TIME * frame_rate
         self.of = _divided(rows["id"], rows["frame"])
+        self.frames = {track: rows["frame"][index] for track, index in self.of.items()}
         self.is_solitary = np.ones(len(rows), bool)
         self.is_solitary[near_rows(rows, _SEPARATION_DISTANCE)[0]] = False
 
@@ -126,21 +127,20 @@ class RowsOfTracks:
 
     def before(self, track: int, other: int, frame: int) -> int | None:
         """The last row of a track before a frame in which it is apart; None where it has none before."""
-        rows = self.of[track][self.rows["frame"][self.of[track]] < frame][::-1]
-        return self._first_apart(self._near(rows, frame), other)
+        first, stop = np.searchsorted(self.frames[track], [frame - self.reach, frame]).tolist()
+        return self._first_apart(self.of[track][min(first, max(stop - 1, 0)) : stop][::-1], other)
 
     def after(self, track: int, other: int, frame: int) -> int | None:
         """The first row of a track from a frame on in which it is apart; None where it has none."""
-        rows = self.of[track][self.rows["frame"][self.of[track]] >= frame]
-        return self._first_apart(self._near(rows, frame), other)
-
-    def _near(self, rows: Ints, frame: int) -> Ints:
-        """Those of some rows, the nearest first, that are near a frame; the nearest where the person was away."""
-        reached = rows[np.abs(self.rows["frame"][rows] - frame) <= self.reach]
-        return reached if len(reached) else rows[:1]
+        first = int(np.searchsorted(self.frames[track], frame))
+        stop = int(np.searchsorted(self.frames[track], frame + self.reach, "right"))
+        return self._first_apart(self.of[track][first : max(stop, first + 1)], other)
 
     def _first_apart(self, rows: Ints, other: int) -> int | None:
-        """The first of some rows in which a track is apart from another; a solitary one if that is soon after."""
+        """The first of some rows, nearest first, in which a track is apart from another; or a solitary one soon after.
+
+        Rows within some seconds of an answer are asked; beyond, the nearest alone.
+        """
         if not len(rows):
             return None
         distant = rows[self._is_apart(rows, other)]
@@ -157,7 +157,7 @@ class RowsOfTracks:
         if not other:
             return self.is_solitary[rows]
         of_other, frame = self.of[other], self.rows["frame"]
-        at = of_other[np.searchsorted(frame[of_other], frame[rows]).clip(max=len(of_other) - 1)]
+        at = of_other[np.searchsorted(self.frames[other], frame[rows]).clip(max=len(of_other) - 1)]
         x, y = (self.rows[name][at] - self.rows[name][rows] for name in ("x", "y"))
         return np.asarray((frame[at] != frame[rows]) | (np.hypot(x, y) >= _SEPARATION_DISTANCE))
 

@@ -26,6 +26,8 @@ DOUBT_LIMIT = 2.0
 """Log-odds of a decision below which a run calls it a doubt, nats: the opposite has a probability of 0.12 or more."""
 _WEIGHED_BELOW = 1.0
 """Evidence of heights and motion alone above which a run takes a decision for certain, nats."""
+_MOST_WEIGHED = 500
+"""Decisions of a run that are weighed, those with the least of that evidence: each takes some milliseconds."""
 _AROUND = 5.0
 """Time before and after a decision of which rows are evidence for it, seconds."""
 _HYPOTHESES = 4
@@ -56,8 +58,8 @@ def weighed_doubts(
 
 def doubt_events(trajectory: Rows, rows: Rows, problem: IdentityProblem, constraints: Constraints) -> Rows:
     """EVENT rows of the decisions of a run that nothing bears out; `trajectory` has its tracks, the rest as above."""
-    uncertain = [one for one in identity_doubts(trajectory, problem.frame_rate) if one.margin < _WEIGHED_BELOW]
-    doubts = weighed_doubts(uncertain, rows, problem, constraints)
+    found = sorted(identity_doubts(trajectory, problem.frame_rate), key=lambda one: one.margin)[:_MOST_WEIGHED]
+    doubts = weighed_doubts([one for one in found if one.margin < _WEIGHED_BELOW], rows, problem, constraints)
     return np.array([_event(one) for one in doubts if one.margin < DOUBT_LIMIT], EVENT)
 
 
@@ -103,13 +105,13 @@ class _Around(NamedTuple):
     def of(cls, doubt: Doubt, tracks: RowsOfTracks, bound: Constraints) -> _Around:
         """Those of a decision and its opposite, which bind rows."""
         frame, reach = tracks.rows["frame"], _AROUND * tracks.frame_rate
-        named = np.concatenate([bound.earlier, bound.later])
-        first, last = min(doubt.first - reach, frame[named].min()), max(doubt.last + reach, frame[named].max())
+        named = frame[np.concatenate([bound.earlier, bound.later])]
+        first, last = min(doubt.first - reach, named.min()), max(doubt.last + reach, named.max())
         parts = []
-        for rows in (tracks.of[doubt.track], tracks.of[doubt.other]):
-            is_near = (frame[rows] >= first) & (frame[rows] <= last)
-            inner = rows[is_near]
-            if len(inner):
-                ends = np.where(frame[rows] < first, inner[0], inner[-1])
-                parts.append((inner, rows[~is_near], ends[~is_near]))
+        for track in (doubt.track, doubt.other):
+            rows, frames = tracks.of[track], tracks.frames[track]
+            start, stop = int(np.searchsorted(frames, first)), int(np.searchsorted(frames, last, "right"))
+            if start < stop:
+                ends = np.repeat(rows[[start, stop - 1]], [start, len(rows) - stop])
+                parts.append((rows[start:stop], np.concatenate([rows[:start], rows[stop:]]), ends))
         return cls(*map(np.concatenate, zip(*parts, strict=True)))
