@@ -11,9 +11,9 @@ leaves as much background as a segmentation misses at the usual rate m (`pixel_m
 what is missing, the masks are torn: log-odds are those of the view's own rates then, of its missing pixels off the rim
 and of foreground away from people. A torn mask holds little foreground that is no person, so what there is says more.
 
-Whole silhouettes have
-background within the outline of a pillar, too: a limb stands beside it. So of each row of an outline as many pixels
-are missing as it has more of background within than of foreground beside, up to half its width on either side.
+Whole silhouettes have background within the outline of a pillar, too: a limb stands beside it. So of each row of an
+outline as many pixels are missing as it has more of background within than of foreground beside, up to half its width
+on either side.
 
 Bodies are as wide as the configured population: sizes that are measured in eaten silhouettes hide what is missing. A
 short time of one person at the rate m counts beside the measured ones, since one frame of a person shows most of a
@@ -172,7 +172,7 @@ def _fill_without_rim(raster: Singles, kept: np.float32, weaker: Singles) -> Non
 
 
 def _clutter_of(first: Ints, spans: Spans, raster: Singles) -> float:
-    """Share of the pixels outside all outlines (n,) that are foreground."""
+    """Share of the pixels of raster (v, u) outside all outlines, as of `outlines`, that are foreground: 0..1."""
     owner = np.full(raster.shape, -1, np.int16)
     paint_outlines(np.arange(len(first)), first, spans, owner)
     return float((raster[owner < 0] > 0).mean()) if (owner < 0).any() else 0.0
