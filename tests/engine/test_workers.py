@@ -100,6 +100,9 @@ def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
         while not list(folder.glob("segment-*-*.h5")) and not over.wait(0.02):
             pass
         cluster.workers[0].kill()
+        cluster.workers[1].send_signal(signal.SIGCONT)
+
+    cluster.workers[1].send_signal(signal.SIGSTOP)  # what the first worker has, no other has
 
     with beside(kill):
         assert track(rig_path, output, "--scheduler", cluster.address) == 0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from functools import lru_cache
 from pathlib import Path
 
@@ -43,7 +44,7 @@ def make_by_cluster(
     ConfigError
         Where the package `distributed` or the scheduler is missing.
     WorkerError
-        Where the workers of a segment die repeatedly.
+        Where the workers of a segment die repeatedly, or the scheduler gives it up.
     StsegError
         An error raised by a worker.
     """
@@ -59,7 +60,7 @@ def make_by_cluster(
         ) from error
     with client:
         name = job.recording.rig.name  # the dashboard shows the part of a key before the first dash as the stage
-        shared = client.scatter(pickle.dumps(job), broadcast=True)
+        shared = client.submit(bytes, pickle.dumps(job), pure=False)  # unlike scattered bytes, made anew if a worker dies
         futures = {}
         for segment in missing:
             path, key = draft(segment.index).absolute(), f"segment-{name}-{segment.index:05}"
@@ -68,7 +69,7 @@ def make_by_cluster(
             segment = futures.pop(future)  # released: its file exists, so it is not recomputed if its worker dies
             try:
                 path = future.result()
-            except KilledWorker as error:
+            except (KilledWorker, CancelledError) as error:
                 frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
                 raise WorkerError("--scheduler", frames, str(error), "workers that stay alive") from error
             advance(segment.stop - segment.first)
