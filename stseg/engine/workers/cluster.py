@@ -60,7 +60,7 @@ def make_by_cluster(
         ) from error
     with client:
         name = job.recording.rig.name  # the dashboard shows the part of a key before the first dash as the stage
-        shared = client.submit(bytes, pickle.dumps(job), pure=False)  # unlike scattered bytes, made anew if a worker dies
+        shared = client.submit(bytes, pickle.dumps(job), pure=False)  # a result is made anew, scattered bytes are not
         futures = {}
         for segment in missing:
             path, key = draft(segment.index).absolute(), f"segment-{name}-{segment.index:05}"
