@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import time
 from collections import deque
@@ -12,7 +11,6 @@ from typing import NamedTuple, Protocol
 
 import cv2
 
-import stseg.io.recording.video.ffmpeg  # noqa: F401  # quietens FFmpeg before its first use
 from stseg.arrays import AnyArray
 from stseg.config import LiveConfig
 from stseg.errors import SourceError
@@ -20,6 +18,7 @@ from stseg.geometry import Camera
 from stseg.io.recording.pictures import picture_observation, reduced_picture
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.source_files import is_pattern
+from stseg.io.recording.video.ffmpeg import ffmpeg_options
 
 STOP_INTERVAL = 0.2
 """Interval at which a request to stop is noticed while waiting, seconds."""
@@ -60,11 +59,11 @@ class FFmpegCapture:
     def __init__(self, address: str, silence: float) -> None:
         if not _ADDRESS.match(address):
             raise OSError("no address of a live stream")
-        os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", _OPTIONS)
         limit = round(1000 * silence)
         # One thread: each of FFmpeg's frame threads delays the stream by a frame.
         options = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, limit, cv2.CAP_PROP_READ_TIMEOUT_MSEC, limit]
-        self._capture = cv2.VideoCapture(address, cv2.CAP_FFMPEG, [*options, cv2.CAP_PROP_N_THREADS, 1])
+        with ffmpeg_options(_OPTIONS, is_default=True):
+            self._capture = cv2.VideoCapture(address, cv2.CAP_FFMPEG, [*options, cv2.CAP_PROP_N_THREADS, 1])
         if not self._capture.isOpened():
             raise OSError("no stream that FFmpeg opens")
 

@@ -4,7 +4,9 @@ import os
 import struct
 import sys
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
+from threading import Event, Thread
 from unittest.mock import Mock
 
 import cv2
@@ -19,6 +21,7 @@ from stseg.config import Config
 from stseg.engine.offline.job import Job
 from stseg.errors import InputError, SourceError
 from stseg.io.calibrations.matlab_file import parse_mat
+from stseg.io.live.live_stream import FFmpegCapture
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.rigs import read_recording
@@ -145,20 +148,35 @@ def test_pipes_are_not_waited_for(tmp_path: Path, refusal: Command) -> None:
     refusal("run", rig, "-o", tmp_path / "q.h5")
 
 
-def test_ffmpeg_is_told_to_open_files_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("given", [None, "protocol_whitelist;rtsp"])
+def test_ffmpeg_has_its_options_while_it_opens_alone(
+    given: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files alone for a file, though a stream is being opened by another thread; and then what it had before."""
     film(tmp_path / "a.avi", tmp_path / "plain.avi")
-    found: list[str | None] = []
+    found: dict[str, str | None] = {}
+    name, opening, file_opened = "OPENCV_FFMPEG_CAPTURE_OPTIONS", Event(), Event()
 
-    def open_capture(address: str, backend: int) -> cv2.VideoCapture:
-        found.append(os.environ.get("OPENCV_FFMPEG_CAPTURE_OPTIONS"))
-        return plain(address, backend)
+    def open_capture(address: str, backend: int, more: Sequence[int] = ()) -> cv2.VideoCapture:
+        (opening if more else file_opened).set()
+        if more:
+            file_opened.wait(0.3)  # it is not
+        found[address[:4]] = os.environ.get(name)
+        return plain(address, backend, more)
 
     plain = cv2.VideoCapture
+    file = Thread(target=read_video_size, args=[tmp_path / "a.avi"])
+    stream = Thread(target=refused, args=[OSError, "no stream", FFmpegCapture, "rtsp://127.0.0.1:9/x", 0.1])
     monkeypatch.setattr(cv2, "VideoCapture", open_capture)
-    monkeypatch.setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;http")
-    assert read_video_size(tmp_path / "a.avi") == (64, 48)
-    assert found == ["protocol_whitelist;file"]
-    assert os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] == "protocol_whitelist;http"
+    monkeypatch.delenv(name, raising=False) if given is None else monkeypatch.setenv(name, given)
+    stream.start()
+    opening.wait()
+    file.start()
+    for thread in (stream, file):
+        thread.join()
+    assert found["file"] == "protocol_whitelist;file"
+    assert found["rtsp"] == given if given else "rtsp_transport;tcp" in str(found["rtsp"])
+    assert os.environ.get(name) == given
 
 
 def test_damaged_pictures_are_answered_in_one_line(

@@ -2,20 +2,22 @@
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from multiprocessing import active_children
+from multiprocessing import active_children, current_process, forkserver
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import distributed
 import pytest
 from cluster import Cluster, started_cluster
 from recordings import ENVIRONMENT, FRAMES, assert_same, compiled_only, process, run_words, track, write_recording
-from refusals import Command
+from refusals import Command, refused
 from scenes import corner_cameras, rig_of
 
 import stseg
@@ -23,6 +25,7 @@ from stseg.config import Config
 from stseg.engine.memory import process_memory
 from stseg.engine.workers import worker_processes
 from stseg.engine.workers.worker_processes import processes_that_fit
+from stseg.engine.workers.workforce import Workforce
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.io.recording.rigs import read_recording
@@ -78,8 +81,45 @@ def test_what_a_worker_finds_wrong_is_one_line(tmp_path: Path, refusal: Command)
     refusal(*run_words(rig, tmp_path / "run.h5", "--workers", "2"))
 
 
+@pytest.mark.parametrize(
+    ("script", "found"),
+    [
+        (
+            "import stseg\nstseg.track('rig.toml', workers=2)",
+            "status 1 before it began, expected a script file with",
+        ),
+        ("import os\nos._exit(0)", "status 0 before it began"),
+        ("import os\nos.kill(os.getpid(), 9)", "3 workers died while processing it, the last with status -9"),
+    ],
+)
+def test_workers_that_never_begin_are_not_waited_for(
+    script: str, found: str, rig_path: Path, tmp_path: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each first runs the script that is the main module."""
+    (tmp_path / "script.py").write_text(script)
+    main_module = ModuleType("__main__")
+    main_module.__file__ = str(tmp_path / "script.py")
+    monkeypatch.setitem(sys.modules, "__main__", main_module)
+    assert found in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "2"))
+
+
+def test_workers_that_cannot_be_started(
+    rig_path: Path, tmp_path: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ends(path: str) -> None:
+        raise EOFError(path)  # as where the process that forks them has died
+
+    monkeypatch.setattr(forkserver, "connect_to_new_process", ends)
+    assert "no process that can be started" in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "2"))
+
+
 def test_no_workers_are_refused(rig_path: Path, tmp_path: Path, refusal: Command) -> None:
     assert "--workers: found 0" in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "0"))
+
+
+def test_a_script_that_a_worker_runs_starts_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(current_process(), "_inheriting", True, raising=False)
+    refused(ConfigError, "a script that its workers run as well", Workforce, 2)
 
 
 @pytest.fixture

@@ -12,8 +12,9 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Lock
+from threading import Condition
 
 from stseg.errors import SourceError
 
@@ -27,7 +28,6 @@ from stseg.io.untrusted import limits
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 _OPTIONS, _FILES_ONLY = "OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file"
-_opening = Lock()
 
 _HEAD = 512
 _TEXT_VIDEO = b"YUV4MPEG2"
@@ -50,7 +50,7 @@ def open_video(path: Path, key: str) -> cv2.VideoCapture:
         head = os.pread(descriptor, _HEAD, 0)
         if _is_text(head):
             raise SourceError(path, key, "a text, such as a playlist", "a video that FFmpeg decodes")
-        with _files_only():
+        with ffmpeg_options(_FILES_ONLY):
             capture = cv2.VideoCapture(_address(path, descriptor), cv2.CAP_FFMPEG)
     finally:
         os.close(descriptor)
@@ -61,18 +61,43 @@ def open_video(path: Path, key: str) -> cv2.VideoCapture:
     return capture
 
 
+@dataclass
+class _Openings:
+    """Captures that are being opened now, all with the same options: OpenCV takes them from the environment alone."""
+
+    number: int = 0
+    options: str = ""
+    given: str | None = None
+    turn: Condition = field(default_factory=Condition)
+
+
+_openings = _Openings()
+
+
 @contextmanager
-def _files_only() -> Iterator[None]:
-    """FFmpeg opens nothing but files meanwhile; OpenCV takes its options from the environment alone."""
-    with _opening:
-        given = os.environ.get(_OPTIONS)
-        os.environ[_OPTIONS] = _FILES_ONLY
-        try:
-            yield
-        finally:
-            os.environ.pop(_OPTIONS)
-            if given is not None:
-                os.environ[_OPTIONS] = given
+def ffmpeg_options(options: str, is_default: bool = False) -> Iterator[None]:
+    """FFmpeg has these options within the body, or those of the environment where these are but the default.
+
+    The environment is as before afterwards. Bodies with the same options run at the same time, others one by one.
+    """
+    now = _openings
+    with now.turn:
+        now.turn.wait_for(lambda: now.number == 0 or now.options == options)
+        if now.number == 0:
+            now.given, now.options = os.environ.get(_OPTIONS), options
+            if now.given is None or not is_default:
+                os.environ[_OPTIONS] = options
+        now.number += 1
+    try:
+        yield
+    finally:
+        with now.turn:
+            now.number -= 1
+            if now.number == 0:
+                os.environ.pop(_OPTIONS)
+                if now.given is not None:
+                    os.environ[_OPTIONS] = now.given
+                now.turn.notify_all()
 
 
 def _address(path: Path, descriptor: int) -> str:

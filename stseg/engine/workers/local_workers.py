@@ -19,7 +19,7 @@ from pathlib import Path
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
-from stseg.engine.workers.worker_processes import CONTEXT, started_process
+from stseg.engine.workers.worker_processes import CONTEXT, GUARD, started_process
 from stseg.errors import StsegError, WorkerError
 from stseg.io.machine import free_cores
 from stseg.kernels.accelerate import compilation_noted
@@ -36,6 +36,7 @@ class _Worker:
     pipe: Connection
     cores: int
     segment: Segment | None = None
+    has_begun: bool = False
 
     def send(self, order: object) -> None:
         """Send it a segment and the path of its file, or a number of cores."""
@@ -74,7 +75,7 @@ def make_by_workers(
     Raises
     ------
     WorkerError
-        Where the workers of a segment die repeatedly.
+        Where the workers of a segment die repeatedly, or one ends before it begins.
     StsegError
         An error raised by a worker.
     """
@@ -102,11 +103,12 @@ def make_by_workers(
                 elif isinstance(message, BaseException):
                     raise message
                 else:
-                    pool[pool.index(worker)] = _start(job, worker.cores)
+                    pool.remove(worker)
                     if segment is not None:
                         tries[segment.index] += 1
-                        _limit_tries(segment, tries[segment.index], worker.process)
+                        _limit_tries(segment, tries[segment.index], worker)
                         pending.append(segment)
+                        pool.append(_start(job, worker.cores))
 
 
 def _share_cores(busy: list[_Worker]) -> None:
@@ -132,17 +134,23 @@ def _ready(pool: list[_Worker]) -> list[_Worker]:
 def _receive(worker: _Worker) -> object:
     """Number of fused frames, a note, the file of a segment, or an error; None from a worker that has died."""
     try:
-        return worker.pipe.recv()
+        message: object = worker.pipe.recv()
+        worker.has_begun = True
+        return message
     except (EOFError, OSError):
         worker.process.join()
         return None
 
 
-def _limit_tries(segment: Segment, tries: int, process: BaseProcess) -> None:
-    """Raise WorkerError where a segment has lost as many workers as are allowed."""
+def _limit_tries(segment: Segment, tries: int, worker: _Worker) -> None:
+    """Raise WorkerError where a segment has lost as many workers as are allowed, or no worker will ever begin."""
+    status = worker.process.exitcode or 0
+    if not worker.has_begun and status >= 0:  # it was not killed, which may happen to any
+        found = f"a worker that ended with status {status} before it began"
+        raise WorkerError("--workers", "", found, f"a script file with {GUARD} around its calls, or 1 process")
     if tries == _TRIES:
         frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
-        found = f"{tries} workers died while processing it, the last with status {process.exitcode}"
+        found = f"{tries} workers died while processing it, the last with status {status}"
         raise WorkerError("--workers", frames, found, "enough memory for each worker, or fewer workers")
 
 
@@ -194,6 +202,7 @@ def _main(job: Job, cores: int, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     orders, worker = _Orders(pipe, cores), None
     with suppress(EOFError, BrokenPipeError):  # the parent process has ended
+        pipe.send(0)
         while True:
             segment, draft = orders.segment()
             try:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
 
+from stseg.errors import ConfigError, WorkerError
 from stseg.import_path import SafeChildren
 from stseg.io.machine import free_cores, free_memory
 
@@ -25,6 +26,7 @@ CONTEXT: ForkServerContext | SpawnContext = (
 )
 """Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
 
+GUARD = '`if __name__ == "__main__":`'
 _PRELOADED = "stseg.engine.workers.preloaded"
 PROCESS_MEMORY = 650 * 2**20
 """Memory that a process of a run is taken to need on a small ground, bytes."""
@@ -47,8 +49,17 @@ def prepare_workers(workers: int | None) -> None:
 
 
 def started_process(target: Callable[..., None], *arguments: object) -> BaseProcess:
-    """A further process, started; it is killed at the latest with this one."""
+    """A further process, started; it is killed at the latest with this one. WorkerError where none can be started."""
     process = CONTEXT.Process(target=target, args=arguments, daemon=True)
-    with SafeChildren():
-        process.start()
+    try:
+        with SafeChildren():
+            process.start()
+    except (OSError, EOFError) as error:
+        raise WorkerError("--workers", "", f"no process that can be started ({error})", "1 process") from error
     return process
+
+
+def require_guard() -> None:
+    """Raise ConfigError in a process that, at its start, runs a script as the script's own process does."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise ConfigError("--workers", "", "a script that its workers run as well", f"{GUARD} around its calls")

@@ -14,7 +14,7 @@ from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
 from stseg.engine.workers.cluster import make_by_cluster
 from stseg.engine.workers.local_workers import make_by_workers
-from stseg.engine.workers.worker_processes import FORKED, prepare_workers, processes_that_fit
+from stseg.engine.workers.worker_processes import FORKED, prepare_workers, processes_that_fit, require_guard
 from stseg.errors import ConfigError
 from stseg.io.machine import free_cores
 
@@ -26,7 +26,7 @@ class Workforce:
     Raises
     ------
     ConfigError
-        Where there is not one process at least.
+        Where there is not one process at least, or several are asked for while a worker runs the script.
     """
 
     workers: int | None = None
@@ -35,6 +35,8 @@ class Workforce:
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:
             raise ConfigError("--workers", "", self.workers, "1 or more processes")
+        if self.workers != 1:
+            require_guard()
 
     def processes(self, job: Job) -> int:
         """Number of processes of this machine."""
