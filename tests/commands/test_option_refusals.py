@@ -1,15 +1,18 @@
 """What commands refuse before they begin: the option, what was found, what was expected, in one line."""
 
+from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
-from attacks import film, write_rig
+from attacks import RIG, film, write_rig
 from refusals import Command, refused
 from run_files import write_empty_run, write_small_run
 
+import stseg
 from stseg.arrays import Floats
-from stseg.errors import CalibrationError
+from stseg.commands.main import main
+from stseg.errors import CalibrationError, OutputError
 from stseg.geometry import Grid, Rig
 
 POINTS = "camera,u,v,x,y\ncam1,10,40,0,0\ncam1,50,40,1,0\ncam1,30,30,0,1\n"
@@ -21,9 +24,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where the command is called: a rig, a run, an empty run, a film and points."""
     (tmp_path / "other").mkdir()
     write_rig(tmp_path)
+    write_rig(tmp_path / "other", "cam1", "cam9")
     write_small_run(tmp_path / "run.h5")
     write_empty_run(tmp_path / "other" / "empty.h5")
-    film(tmp_path / "film.avi", tmp_path / "plain.avi")
+    for name in ("film.avi", "b.avi"):
+        film(tmp_path / name, tmp_path / "plain.avi")
     (tmp_path / "points.csv").write_text(POINTS)
     (tmp_path / "cam1.xml").write_text("<!-- made by stseg -->")
     monkeypatch.chdir(tmp_path)
@@ -38,6 +43,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("calibrate page film.avi --frame 99 --area=0,0,1,1 -o q.html", "--frame: found 99, expected a frame of the"),
         ("calibrate align rig.toml points.csv -o q.toml --metres-per-pixel 0", "--metres-per-pixel: found 0"),
         ("calibrate align rig.toml points.csv -o q.toml --metres-per-pixel nan", "--metres-per-pixel: found nan"),
+        ("calibrate align rig.toml other/rig.toml -o q.toml", "camera: found cam9, expected a camera of the same name"),
+        ("calibrate auto film.avi b.avi --background cam1.xml -o cam1.xml --frame-rate=5 --overwrite", "file that is"),
+        ("calibrate check rig.toml", "rig.toml: camera: found one camera, expected two or more"),
         ("calibrate check rig.toml --frames 5:3", "--frames: found '5:3'"),
         ("calibrate check rig.toml --frames 4:9", "--frames: found 4:9, expected a part of the recording"),
         ("calibrate check rig.toml -o boxes.csv --overwrite", "boxes.csv: found a file that is read here"),
@@ -48,6 +56,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("inspect other/empty.h5 --slice frame=1,plane=all -o q.png", "expected a run with frames"),
         ("review run.h5 -o q.html --most 0", "--most: found 0, expected 1 or more questions"),
         ("run rig.toml -o q.h5 --publish http://127.0.0.1:1", "--publish: found that alone"),
+        ("run rig.toml -o q.h5 --follow --publish ftp://u:word@h", "--publish: found 'ftp://u:***@h', expected"),
+        ("\x1b[31m", r"command line: found '\x1b[31m', expected one of"),
         ("plan rig.toml --set kalman.patience=3", "kalman.patience: found a value without effect: 3.0"),
     ],
 )  # fmt: skip
@@ -55,6 +65,24 @@ def test_options_are_refused(folder: Path, words: str, message: str, refusal: Co
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert message in refusal(*words.split())
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+def test_pages_and_their_commands_hold_names_as_text(folder: Path) -> None:
+    """Names of files are quoted for a shell, names of cameras for HTML; no page replaces what it shows."""
+    (folder / "film.avi").rename(folder / "a film.avi")
+    assert main(["calibrate", "page", "a film.avi", "--area", "0, 0,1,1", "-o", "page.html"]) == 0
+    text = unescape((folder / "page.html").read_text())
+    assert "'--area=0, 0,1,1'" in text and "--sources 'a film.avi'" in text
+    write_rig(folder, 'name = "yard"', "name = '<b>'")
+    with (folder / "rig.toml").open("a") as rig:
+        rig.write(RIG[RIG.index("[[camera]]") :].replace("cam1", "<i>"))
+    found = stseg.check_rig("rig.toml")
+    found.write_page(Path("check.html"))
+    text = (folder / "check.html").read_text()
+    assert (
+        "&lt;b&gt;" in text and "&lt;i&gt;" in text and not {"<b>", "<i>"} & {text[k : k + 3] for k in range(len(text))}
+    )
+    refused(OutputError, "a file that is read", found.write_page, Path("boxes.csv"), overwrite=True)
 
 
 @pytest.mark.parametrize(

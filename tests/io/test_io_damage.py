@@ -90,6 +90,9 @@ def test_an_index_that_does_not_place_the_loss(tmp_path: Path) -> None:
     assert lost is not None and len(lost)
     assert lost_frames(path, FRAMES - len(lost) - 1) is None
     whole = recording.sources[0].source.path
-    for data in (whole.read_bytes()[:-100], whole.read_bytes()[:300], b"RIFF", b""):
+    film = whole.read_bytes()
+    first = film.rindex(b"idx1") + 8
+    repeating = film[: first + 12] + bytes(4) + film[first + 16 :]
+    for data in (film[:-100], film[:300], b"RIFF", b"", film + bytes(100), repeating):
         path.write_bytes(data)
         assert lost_frames(path, 5) is not None

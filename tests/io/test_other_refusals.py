@@ -25,6 +25,7 @@ from stseg.io.outputs.video_writer import write_film
 from stseg.io.outputs.whole_files import clear_frames, publish_part
 from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.io.toml import parse_toml
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
@@ -71,11 +72,19 @@ HEAPS = f"{_BEGIN}\x40{_SEVEN}\1{_SEVEN}\x10{_SEVEN}{_BEGIN}{_SEVEN}\0{_SEVEN}\0
         (ValueError, lambda at: LiveTable(at / "l.csv", 5.0, 0).append(np.zeros(1, TRAJECTORY)), "that is not open"),
         (OutputError, lambda at: write_film(at / "a.avi", [], 5.0, False), "the ending '.avi'"),
         (OutputError, lambda at: write_film(at / os.fsdecode(b"\xff.mp4"), [], 5.0, False), "a path that is no UTF-8"),
+        (OutputError, lambda at: write_film(at / "a.mp4", [np.zeros((0, 0, 3), np.uint8)], 5.0, False), "cannot be op"),
         (OSError, lambda at: clear_frames(link(at / "link", at)), "link is a link"),
+        (OutputError, lambda at: begin_anew(at / "q.h5", '["\\u001b"]'), r"found \['\\x1b'\], expected the run"),
     ],
 )  # fmt: skip
 def test_calls_are_refused(tmp_path: Path, kind: type[Exception], call: Callable[[Path], object], message: str) -> None:
     refused(kind, message, call, tmp_path)
+
+
+def begin_anew(output: Path, notes: str) -> None:
+    for _ in range(2):
+        with WorkFolder(output, {}) as work:
+            (work.path / "begun.json").write_text(notes)
 
 
 def text(path: Path, content: str) -> Path:
@@ -126,6 +135,12 @@ def test_a_film_of_a_scene_that_cannot_be_written(
     cv2.VideoWriter.return_value.isOpened.return_value = opened  # type: ignore[attr-defined]
     camera = Mock(size=(64, 48))
     refused(OutputError, message, lambda: simulated_scene._Video(tmp_path / "a.avi", camera, 5.0, None).close())
+
+
+def test_names_of_runs_are_archived_without_escape_codes(run_path: Path) -> None:
+    (path := run_path.with_name("q")).touch()
+    ARCHIVES["sqlite"](path, [read_run(run_path.rename(run_path.with_name("\x1b[31m.h5")))])
+    assert b"\x1b[" not in path.read_bytes() and rb"\x1b[31m.h5" in path.read_bytes()
 
 
 def test_tables_that_do_not_fit_are_not_archived(run_path: Path) -> None:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock, Mock
 
 import numpy as np
 import pytest
@@ -35,6 +36,27 @@ def rows_of(*frames: int) -> Rows:
 
 def publisher_to(address: str, said: Callable[[str], None] = pytest.fail) -> Publisher:
     return Publisher(receiver_of(address), 5.0, said)
+
+
+@pytest.mark.parametrize(
+    ("address", "library"),
+    [("mqtt://h/t", {"Client.return_value.publish.return_value.is_published.return_value": False}),
+     ("ws://h/t", {"connect.return_value.ping.return_value.wait.return_value": False,
+                   "connect.return_value.__iter__": Mock(return_value=iter(())), "WebSocketException": OSError})],
+)  # fmt: skip
+def test_what_no_receiver_confirms_is_not_sent(
+    address: str, library: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stseg.io.live.publishing.load_extra", lambda *_: MagicMock(**library))
+    refused(OSError, "no answer of the", receiver_of(address).send, b"")
+
+
+def test_errors_are_said_without_passwords_and_escape_codes() -> None:
+    said = list[str]()
+    with Publisher(Mock(send=Mock(side_effect=OSError("\x1b http://a:word@h"))), 5.0, said.append) as publisher:
+        publisher.append(rows_of(7))
+        wait_for(lambda: said)
+    assert said[0] == r"publishing waits for its receiver (\x1b http://a:***@h)"
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """The simulated scenes: geometry, bodies, crowd, light, detector, files and the command."""
 
+import os
 from collections import Counter
 from dataclasses import fields, replace
 from itertools import islice
@@ -405,6 +406,10 @@ def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
     write_scene(tmp_path, film, overwrite=True)
     assert (tmp_path / "notes.txt").read_text() == "mine"
+    (tmp_path / "link").symlink_to(tmp_path)
+    refused(OutputError, "found link, a link", write_scene, tmp_path, film, overwrite=True)
+    (tmp_path / "link").unlink()
+    refused(OutputError, "no UTF-8", write_scene, tmp_path / os.fsdecode(b"\xff"), film)
     (tmp_path / "stseg-scene").unlink()
     refused(
         OutputError, r"truth\.csv: found a file that stseg did not make", write_scene, tmp_path, film, overwrite=True

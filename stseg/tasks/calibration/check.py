@@ -17,7 +17,7 @@ from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.recordings import recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
-from stseg.errors import ConfigError
+from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry.sampling import Sampling
 from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.recording.frames import open_frames
@@ -160,6 +160,8 @@ def check_rig(
             advance(1)
     if not boxes:
         raise ConfigError("--frames", "", f"{first}:{stop}", "a part of the recording")
+    if len(sizes) < 2:
+        raise CalibrationError(recording.path, "camera", "one camera", "two or more, each to be checked by the others")
     check = check_boxes(recording.rig, boxes)
     return RigCheck(recording, check, tuple(verdict_text(recording.rig, check)), *middle)
 

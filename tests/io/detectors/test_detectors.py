@@ -1,5 +1,6 @@
 """Detectors in ONNX files, by small models of known output; the detector by oriented gradients, by OpenCV 4."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -108,6 +109,9 @@ def test_refusals_name_the_file_and_the_outputs(tmp_path: Path) -> None:
     refused(
         SourceError, r"none\.onnx: found No such file.*expected a model in ONNX", OnnxDetector, tmp_path / "none.onnx"
     )
+    detector = OnnxDetector(detector_models.yolo8(tmp_path / "later.onnx"))
+    detector.layout = replace(detector.layout, decode=lambda *_: None)
+    refused(FormatError, "expected those of", detector.detect, picture((WIDTH, HEIGHT)))
     (tmp_path / "text.onnx").write_text("this is no model\n")
     refused(FormatError, r"text\.onnx: found what is no ONNX", OnnxDetector, tmp_path / "text.onnx")
     for data, found in (
