@@ -32,6 +32,7 @@ from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.estimates import Estimates
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate
+from stseg.noise.torn_masks import mask_log_likelihood
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
@@ -153,9 +154,9 @@ class Detector:
         observations, failures = self.observe(views, learned.box_noise.noise), learned.failures
         failures.begin(predicted, self.views, observations)
         included: Observations = failures.kept(observations)
-        if predicted is None and not self._has_boxes:
-            self._learn_first_rims(learned.rims, included, learned.population.body)
         is_key = frame % self._key_interval == 0
+        if learned.rims.is_young and (is_key or predicted is None) and not self._has_boxes:
+            self._learn_first_rims(learned, included, _FIRST_FRAME_SEARCHES if predicted is None else 1)
         explanation, is_searched = self._explained(learned, is_key, included, predicted, proposals)
         if failures.learn(explanation, self.views, observations):
             included = failures.kept(observations)
@@ -200,12 +201,17 @@ class Detector:
         """Evidence of a frame under the prior of its predicted tracks and a population."""
         return self.evidence(observations, Prior.of(predicted, self.config, body, self.border))
 
-    def _learn_first_rims(self, rims: RimEstimate, observations: Observations, body: BodyConfig) -> None:
-        """Learn the rims of a session's first frame before it is explained: births cost nothing in that frame alone."""
-        for _ in range(_FIRST_FRAME_SEARCHES):
-            evidence = self._evidence(rims.applied(observations), body, None)
-            explanation = explained_frame(self._search.whole(self._search.of_tracks(evidence)))
-            rims.learn(explanation.people, self.views, observations)
+    def _learn_first_rims(self, learned: Estimates, observations: Observations, searches: int) -> None:
+        """Learn the rims of a young session before its frame is explained, as if births cost nothing.
+
+        By what is learned so far, or by a guess of torn masks: from the explanation by which the masks are more likely.
+        """
+        for _ in range(searches):
+            both = learned.rims.applied(observations), learned.rims.torn_guess(observations)
+            births = [self._evidence(views, learned.population.body, None) for views in both]
+            first = [explained_frame(self._search.whole(self._search.of_tracks(evidence))) for evidence in births]
+            likely = max(first, key=lambda one: mask_log_likelihood(one.pixel_assignment, observations))
+            learned.rims.learn(likely.people, self.views, observations)
 
     def _with_excluded_residuals(
         self, explanation: Explanation, observations: Observations, excluded: Flags

@@ -33,6 +33,7 @@ from stseg.bodies.outlines import WHOLE_SHARE, Spans, paint_outlines
 from stseg.bodies.views import PixelView, View, ViewObservation
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.kernels.accelerate import kernel, part
+from stseg.noise.torn_masks import TORN_RATES, with_rates
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import People
 
@@ -92,6 +93,11 @@ class RimEstimate:
         rates = np.column_stack([miss, clutter])
         return np.where(miss[:, None] > self._miss, rates, [self._miss, self._clutter])
 
+    @property
+    def is_young(self) -> bool:
+        """Whether people were measured for less time than the mean of all views counts."""
+        return bool(self.shares.sums[:, 0].mean() < _MEAN_WEIGHT)
+
     def _mean(self) -> Floats:
         """Shares of all views and the first guess for one second of one person, float64 (3,)."""
         total = self.shares.sums.sum(0) + _PRIOR_WEIGHT * np.array([1.0, self._miss, self._miss])
@@ -99,12 +105,21 @@ class RimEstimate:
 
     def applied(self, observations: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
         """The observations of all views without the withdrawn share of their rims, by the rates of torn masks."""
+        return self._by(self.withdrawn, self.torn, observations)
+
+    def torn_guess(self, observations: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
+        """The same without any rim, by a guess of the rates of torn masks."""
+        number = len(observations)
+        return self._by(np.ones(number), np.tile(TORN_RATES, (number, 1)), observations)
+
+    def _by(
+        self, withdrawn: Floats, rates: Floats, observations: Sequence[ViewObservation | None]
+    ) -> list[ViewObservation | None]:
+        """Observations without shares (view,) of their rims, by rates (view, 2)."""
         usual = self._miss, self._clutter
         return [
             None if view is None else with_rates(without_rim(view, share), usual, (miss, clutter))
-            for view, share, (miss, clutter) in zip(
-                observations, self.withdrawn.tolist(), self.torn.tolist(), strict=True
-            )
+            for view, share, (miss, clutter) in zip(observations, withdrawn.tolist(), rates.tolist(), strict=True)
         ]
 
     def skip_frame(self) -> None:
@@ -128,17 +143,6 @@ class RimEstimate:
                 self.clutter.add(
                     self.clutter.seconds(np.array([1.0, _clutter_of(first, spans, observation.raster)])), k
                 )
-
-
-def with_rates(observation: ViewObservation, usual: tuple[float, float], rates: tuple[float, float]) -> ViewObservation:
-    """An observation of pixels by other rates of misses and clutter than the usual ones: log-odds of one likelihood."""
-    if rates == usual:
-        return observation
-    (miss, clutter), ratio = usual, np.exp(observation.raster)
-    share = (ratio * (1.0 - clutter) - miss) / (1.0 - 2.0 * miss + ratio * (1.0 - 2.0 * clutter))
-    miss, clutter = rates
-    body, empty = (wrong + share * (right - wrong) for wrong, right in ((miss, 1 - miss), (1 - clutter, clutter)))
-    return replace(observation, raster=np.log(body / empty).astype(np.float32))
 
 
 def without_rim(observation: ViewObservation, withdrawn: float) -> ViewObservation:

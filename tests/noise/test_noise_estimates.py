@@ -27,7 +27,8 @@ from stseg.io.recording.rigs import parse_rig
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.population_estimate import PopulationEstimate
-from stseg.noise.rim_estimate import RimEstimate, with_rates, without_rim
+from stseg.noise.rim_estimate import RimEstimate, without_rim
+from stseg.noise.torn_masks import mask_log_likelihood, with_rates
 from stseg.records.people import People
 
 RATE = 5.0
@@ -336,6 +337,16 @@ def test_log_odds_by_other_rates_are_those_of_the_likelihood(miss: float, clutte
     np.testing.assert_allclose(found, log_odds(miss, clutter), atol=1e-4)
 
 
+def test_masks_are_most_likely_by_the_people_in_them() -> None:
+    inside = [view > 0.5 for view in map(np.asarray, seen(APART, 0))]
+    views = [shown(np.where(view, 2.6, -1.5).astype(np.float32)) for view in inside]
+    exact, aside = (
+        mask_log_likelihood([np.roll(view, shift, axis=1).astype(np.int16) - 1 for view in inside], views)
+        for shift in (0, 3)
+    )
+    assert aside < exact == 0.0
+
+
 def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
     alone = people((0.0, 0.0, 1.7))
     views = likelihoods(room().cameras, alone)
@@ -365,7 +376,7 @@ def test_learned_rims_raise_evidence_in_eaten_silhouettes() -> None:
     asked, evidence = detector_of(room(), "pixels"), []
     first = asked.new_estimates()
     for known in (first, replace(first, rims=learned_rims(APART, seen(APART, 1)))):
-        explained = asked.explain_next(known, 0, seen(standing, 1), expecting(*standing))
+        explained = asked.explain_next(known, 1, seen(standing, 1), expecting(*standing))  # no key frame
         assert len(explained.people) == len(standing)
         evidence.append(explained.people.evidence.sum())
     assert evidence[1] > evidence[0] + 2.0
