@@ -207,11 +207,16 @@ class Detector:
         By what is learned so far, or by a guess of torn masks: from the explanation by which the masks are more likely.
         """
         for _ in range(searches):
-            both = learned.rims.applied(observations), learned.rims.torn_guess(observations)
-            births = [self._evidence(views, learned.population.body, None) for views in both]
-            first = [explained_frame(self._search.whole(self._search.of_tracks(evidence))) for evidence in births]
-            likely = max(first, key=lambda one: mask_log_likelihood(one.pixel_assignment, observations))
-            learned.rims.learn(likely.people, self.views, observations)
+            torn = self._by_births(learned.rims.torn_guess(observations), learned)
+            if len(torn.people):
+                usual = self._by_births(learned.rims.applied(observations), learned)
+                likely = max(usual, torn, key=lambda one: mask_log_likelihood(one.pixel_assignment, observations))
+                learned.rims.learn(likely.people, self.views, observations)
+
+    def _by_births(self, observations: Observations, learned: Estimates) -> Explanation:
+        """A frame's explanation without tracks."""
+        evidence = self._evidence(observations, learned.population.body, None)
+        return explained_frame(self._search.whole(self._search.of_tracks(evidence)))
 
     def _with_excluded_residuals(
         self, explanation: Explanation, observations: Observations, excluded: Flags

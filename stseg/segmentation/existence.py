@@ -11,8 +11,7 @@ Without links a candidate pays for its birth and its death; a link saves both. B
 border of the scene and at the ends of the window. Links form paths: each candidate has at most one predecessor and one
 successor, by a minimum-cost flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame
 that are closer than the reach of a body exclude each other, since their evidence is the same. Links are submodular,
-exclusions are not: roof duality. A path through a candidate that another one excludes falls apart; so paths are then
-sought again without the candidates that are excluded, as long as the energy falls.
+exclusions are not: roof duality. A path through a candidate that another one excludes falls apart.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +34,6 @@ from stseg.segmentation.paths import best_paths, path_marginals
 
 _EXCLUSION_PENALTY = 1e4
 """K: repulsion of candidates that exclude each other, nats."""
-_ROUND_LIMIT = 4
-"""Most times that paths are sought again."""
 Exclusions = tuple[Ints, Ints]
 """Candidates that exclude each other, (pair,) each."""
 
@@ -54,16 +50,6 @@ class Existence:
     """float64 (n,): marginal log-odds of each candidate along its path, nats."""
     gap: float
     """Bound on the distance from the least energy, given the links, nats."""
-
-
-class _Solution(NamedTuple):
-    """A decision, the links on its paths, the bound of `Existence`, and its energy, nats."""
-
-    real: Flags
-    successor: Ints
-    links: Links
-    gap: float
-    energy: float
 
 
 @dataclass(frozen=True)
@@ -85,16 +71,7 @@ class ExistenceModel:
             return Existence(np.zeros(0, bool), np.zeros(0, np.int64), np.zeros(0), 0.0)
         gain, birth, death = self._gains(found)
         links, exclusions = self.links.between(found, birth, death), self._exclusions(found)
-        best = _solve(gain, links, exclusions, np.zeros(n, bool), cut)
-        for _ in range(_ROUND_LIMIT):
-            excluded = _excluded(best.real, exclusions)
-            if not excluded.any():
-                break
-            other = _solve(gain, links, exclusions, excluded, cut)
-            if other.energy >= best.energy:
-                break
-            best = other
-        return Existence(best.real, best.successor, path_marginals(gain, *best.links), best.gap)
+        return _solve(gain, links, exclusions, cut)
 
     def _gains(self, found: WindowCandidates) -> tuple[Floats, Floats, Floats]:
         """g, and in it the costs of birth and death, nats, float64 (n,) each."""
@@ -120,12 +97,10 @@ def _pairs(number: int) -> Ints:
     return np.stack(np.triu_indices(number, 1))
 
 
-def _solve(gain: Floats, links: Links, exclusions: Exclusions, barred: Flags, cut: Callable[..., Flags]) -> _Solution:
-    """The candidates of least energy on the best paths that avoid those that are barred."""
+def _solve(gain: Floats, links: Links, exclusions: Exclusions, cut: Callable[..., Flags]) -> Existence:
+    """The candidates of least energy on the best paths."""
     start, end, bonus = links
-    allowed = ~(barred[start] | barred[end])
-    start, end, bonus = start[allowed], end[allowed], bonus[allowed]
-    successor = best_paths(np.where(barred, -_EXCLUSION_PENALTY, gain), start, end, bonus)
+    successor = best_paths(gain, start, end, bonus)
     chosen = successor[start] == end
     start, end, bonus = start[chosen], end[chosen], bonus[chosen]
     one, other = exclusions
@@ -136,17 +111,7 @@ def _solve(gain: Floats, links: Links, exclusions: Exclusions, barred: Flags, cu
         np.concatenate([_quanta(-bonus), np.full(len(one), round(_EXCLUSION_PENALTY / QUANTUM), np.int64)]),
     )
     least: QuadraticMinimum = minimise(energy, cut)
-    real = least.labels
-    value = -gain[real].sum() - bonus[real[start] & real[end]].sum()
-    return _Solution(real, successor, (start, end, bonus), least.gap * QUANTUM, float(value))
-
-
-def _excluded(real: Flags, exclusions: Exclusions) -> Flags:
-    """Candidates that a real one excludes, bool (n,)."""
-    excluded = np.zeros(len(real), bool)
-    for one, other in (exclusions, exclusions[::-1]):
-        excluded[one[real[other]]] = True
-    return excluded
+    return Existence(least.labels, successor, path_marginals(gain, start, end, bonus), least.gap * QUANTUM)
 
 
 def _quanta(nats: Floats) -> Ints:

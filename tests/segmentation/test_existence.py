@@ -89,15 +89,6 @@ def test_two_candidates_of_one_body_exclude_each_other() -> None:
     assert decision.gap == 0
 
 
-def test_a_path_leads_round_an_excluded_candidate() -> None:
-    standing = [(t, 0.0, -0.3, 20.0, 1) for t in range(9)]
-    passing = [(t, x, y, 3.0, 0 if t == 4 else 2) for t, (x, y) in enumerate(WALK)]
-    found = candidates(*standing, *passing)
-    real = decide(found).real
-    assert real[found.track > 0].all()
-    assert not real[found.track == 0].any()
-
-
 def test_candidates_are_added_inside_paths() -> None:
     weak = np.array([3.0, 3.0, 12.0, 12.0, 3.0, 12.0, 12.0, 3.0, 3.0])
     found = candidates(*walk(weak))

@@ -46,7 +46,6 @@ WHOLE: dict[str, tuple[str, Any]] = {
     "blob scale": ("stseg.detection.frame_evidence.blob_scales", lambda rasters, *_: np.zeros_like(rasters)),
     "hard core": (f"{_DETECTOR}.CORE_MARGIN", 0.3),
     "window existence": ("stseg.trackers.window_existence.WindowExistence.revised", _unrevised),
-    "paths sought again": ("stseg.segmentation.existence._ROUND_LIMIT", 0),
     "people of windows alone": ("stseg.trackers.window_existence.found_by_window", lambda *_: []),
     "gaps bridged by the cut": ("stseg.tracking.windows.tracklets._bridge", lambda *_: None),
     "noise of boxes": ("stseg.noise.box_noise_estimate.BoxNoiseEstimate.learn", lambda *_: None),
