@@ -31,6 +31,9 @@ from stseg.arrays import Labels, Singles
 from stseg.geometry.summed_area import TOP_LEVEL, Levels
 from stseg.kernels.accelerate import kernel, part, wide_kernel
 
+_CELLS_AT_ONCE = 2048
+"""Cells that are summed over all views before the next ones: as many as the fastest memory holds."""
+
 
 class ErrorRates(NamedTuple):
     """Error rates of a view.
@@ -133,17 +136,21 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
 @kernel
 def fill_sums(views: FrameTerms, sums: Sums) -> None:
     """Add what all views see to sums, 0 before."""
-    term = np.empty(len(views.near_person), np.float32)
-    for i in range(len(views.weight)):
-        weight, levels, shares, terms = views.weight[i], views.levels[i], views.share[i], views.terms[i, 0]
-        for c in range(len(term)):  # a loop of its own, so that the other becomes vector code
-            term[c] = terms[np.uint32(levels[c])] if levels[c] >= 0 else np.float32(0)
-        for c in range(len(term)):
-            share = shares[c] if levels[c] >= 0 else np.float32(0)
-            sums.weighted[c] += weight * share * term[c]
-            sums.weights[c] += weight * share
-            sums.shares[c] += share
-    for c in range(len(term)):
+    number, term = len(views.near_person), np.empty(_CELLS_AT_ONCE, np.float32)
+    for first in range(0, number, _CELLS_AT_ONCE):
+        part = slice(first, min(first + _CELLS_AT_ONCE, number))
+        weighted, weights, visible = sums.weighted[part], sums.weights[part], sums.shares[part]
+        for i in range(len(views.weight)):
+            weight, terms = views.weight[i], views.terms[i, 0]
+            levels, shares = views.levels[i, part], views.share[i, part]
+            for c in range(len(levels)):  # a loop of its own, so that the other becomes vector code
+                term[c] = terms[np.uint32(max(levels[c], 0))]
+            for c in range(len(levels)):
+                share = shares[c] if levels[c] >= 0 else np.float32(0)
+                weighted[c] += weight * share * term[c]
+                weights[c] += weight * share
+                visible[c] += share
+    for c in range(number):
         if views.near_person[c] >= 0:
             sums.weighted[c] = _weighted_near_person(views, c)
 

@@ -31,7 +31,7 @@ _NEARLY_ALL = 0.75
 """Share of blocks from which all are taken: to list cells anew in each frame would cost more than to fuse the rest."""
 _MOST_PIXELS = 1 << 20
 """Pixels up to which a sum of levels fits into 32 bits; blocks with more are taken to show something."""
-_MOST_COUNTED = 1 << 17
+_MOST_COUNTED = 1 << 15
 """Cells (n,) of which each stands for itself; of more, every second, third, ... block stands for the next ones."""
 _CODE_VIEWS = 60
 """Number of views with sets that one whole number codes."""

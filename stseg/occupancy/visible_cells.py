@@ -157,6 +157,7 @@ def fill_share(
 
 @kernel
 def fill_map(
+    view: int,
     cells: ShownCells,
     marked: Flags,
     footprint: Footprints,
@@ -166,35 +167,72 @@ def fill_map(
     levels: Levels,
     share: Singles,
 ) -> None:
-    """Fill levels and share (n,) of the cells of marked blocks by a view with a map; UNSEEN where it does not see them.
+    """Fill levels and share (n + k,) of a view with a map; UNSEEN where it does not see a cell.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background. Blocks
-    marked bool (block,) are those at which the view shows something.
+    marked bool (block,) are those at which the view shows something: elsewhere levels are the lowest, and nothing is
+    hidden.
     """
+    pixels, columns = _shown_pixels(table, assigned), table.sums.shape[1] - 1
+    empty, unseen = np.int16(table.lowest), cells.unseen[view]
     for b in range(len(cells.start) - 1):
-        if marked[np.uint64(cells.block[b])]:
-            for k in range(cells.start[b], cells.start[b + 1]):
-                left, top, width, height = footprint[np.uint64(cells.cell[k])]
-                nearest, far = cells.near_person[k], distance[cells.place[k]]
-                if width == 1 and height == 1:
-                    levels[k], share[k] = _of_one_pixel(left, top, nearest, far, table, assigned)
-                else:
-                    levels[k], share[k] = _of_pixels(left, top, width, height, nearest, far, table, assigned)
+        if not marked[np.uint64(cells.block[b])]:
+            _fill_empty(cells.start[b], cells.start[b + 1], empty, unseen, levels, share)
+            continue
+        for k in range(np.uint64(cells.start[b]), np.uint64(cells.start[b + 1])):
+            left, top, width, height = footprint[np.uint64(cells.cell[k])]
+            nearest, far = cells.near_person[k], distance[np.uint64(cells.place[k])]
+            if height == 1 and width <= 2:
+                first = (top - table.top) * columns + left - table.left
+                levels[k], share[k] = _of_two_pixels(first, first + width - 1, nearest, far, pixels, assigned)
+            else:
+                levels[k], share[k] = _of_pixels(left, top, width, height, nearest, far, table, assigned)
+    _fill_empty(cells.start[-1], len(levels), empty, unseen, levels, share)
 
 
 @part
-def _of_one_pixel(
-    left: int, top: int, nearest: int, far: float, table: SumTable, assigned: PixelAssignment
+def _fill_empty(first: int, stop: int, empty: np.int16, unseen: Levels, levels: Levels, share: Singles) -> None:
+    """Fill the levels of cells at which a view shows nothing: all bits of UNSEEN are set."""
+    for k in range(np.uint64(first), np.uint64(stop)):
+        levels[k] = unseen[k] | empty
+    for k in range(np.uint64(first), np.uint64(stop)):
+        share[k] = np.float32(1)
+
+
+@kernel
+def _shown_pixels(table: SumTable, assigned: PixelAssignment) -> Labels:
+    """The level of each pixel that a table covers and TOP_LEVEL + 1 times (1 + the person that it shows, -1 for none).
+
+    Pixels are read once, row by row, since most cells have one or two of them: int32 (v * u,).
+    """
+    rows, columns = table.sums.shape[0] - 1, table.sums.shape[1] - 1
+    pixels = np.empty(rows * columns, np.int32)
+    for v in range(rows):
+        line = assigned.raster[np.uint64(assigned.row[table.top + v])]
+        for u in range(columns):
+            person = np.int32(line[np.uint64(assigned.column[table.left + u])]) + np.int32(1)
+            level = np.int32(sum_of(table.sums, u, v, u + 1, v + 1))
+            pixels[v * columns + u] = level + np.int32(TOP_LEVEL + 1) * person
+    return pixels
+
+
+@part
+def _of_two_pixels(
+    one: int, other: int, nearest: int, far: float, pixels: Labels, assigned: PixelAssignment
 ) -> tuple[int, np.float32]:
-    """Level and share of a cell with a footprint of one pixel, as most have: few branches, which are not foreseen."""
-    u, v = left - table.left, top - table.top
-    level = int(sum_of(table.sums, u, v, u + 1, v + 1))
-    other = assigned.raster[assigned.row[np.uint64(top)], assigned.column[np.uint64(left)]]
-    is_other = (other >= 0) & (other != nearest)
-    if nearest >= 0:
-        is_other = is_other & (not assigned.separate[nearest])
-    is_hidden = is_other & (assigned.distance[np.uint64(other + 1)] < far - SHOULDER)
-    return 0 if is_other & (not is_hidden) else level, np.float32(0 if is_hidden else 1)
+    """Level and share of a cell with two pixels, or with one, which counts twice; most have no more.
+
+    There is no branch: what it depends on is not foreseen.
+    """
+    limit, a, b = far - SHOULDER, np.uint32(pixels[np.uint64(one)]), np.uint32(pixels[np.uint64(other)])
+    person, neighbour = a // np.uint32(TOP_LEVEL + 1), b // np.uint32(TOP_LEVEL + 1)
+    is_open = (person == 0) | (person == np.uint32(nearest + 1))
+    is_neighbour_open = (neighbour == 0) | (neighbour == np.uint32(nearest + 1))
+    hidden = np.int32((assigned.distance[np.uint64(person)] < limit) & (not is_open))
+    neighbour_hidden = np.int32((assigned.distance[np.uint64(neighbour)] < limit) & (not is_neighbour_open))
+    level = np.int32(a % np.uint32(TOP_LEVEL + 1)) * np.int32(is_open) * (np.int32(1) + neighbour_hidden)
+    level += np.int32(b % np.uint32(TOP_LEVEL + 1)) * np.int32(is_neighbour_open) * (np.int32(1) + hidden)
+    return int(level + 1) >> 1, np.float32(1) - np.float32(0.5) * np.float32(hidden + neighbour_hidden)
 
 
 @part

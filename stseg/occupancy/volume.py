@@ -75,6 +75,7 @@ class Occupancy:
         self._ground = rig.grid.ground.reshape(-1, 2).take(order, 0)
         self._distance = sampling.distance.reshape(len(kinds), -1).take(order, 1)
         self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]
+        self._memory = np.empty(0, np.int16), np.empty(0, np.float32)
         self._first_rates = [_first_rates(kind, detection) for kind in kinds]
         self._rate_config = rates or ErrorRateConfig()
 
@@ -173,19 +174,17 @@ class Occupancy:
         weights: Singles,
     ) -> FrameTerms:
         """Terms of the views at the cells that are fused one by one, and at the representatives of the others."""
-        levels, share = np.empty_like(cells.unseen), np.ones(cells.unseen.shape, np.float32)
+        levels, share = self._levels_and_shares(cells.unseen.shape)
         confidence = np.ones((len(views), len(explanation.people)), np.float32)
         for i, view in enumerate(views):
             if view is None:
                 levels[i] = UNSEEN
                 continue
-            if view.table is not None:
-                empty = view.table.lowest
-            else:
+            if view.table is None:
                 empty = int(level_of_match(0.0, rates[i].miss, rates[i].clutter))
+                np.bitwise_or(cells.unseen[i], np.int16(empty), out=levels[i])  # all bits of UNSEEN are set
                 missing = np.where(view.assignment.separate[:-1], 1.0, explanation.people.visibility[i])
                 confidence[i] = missing.astype(np.float32)
-            np.bitwise_or(cells.unseen[i], np.int16(empty), out=levels[i])  # all bits of UNSEEN are set
             self._fill_view(i, view, marked[i], cells, rates[i], levels[i], share[i])
         terms = np.stack([log_odds_terms(one) for one in rates])
         return FrameTerms(levels, share, cells.near_person, terms, weights, confidence)
@@ -200,14 +199,22 @@ class Occupancy:
         levels: Levels,
         share: Singles,
     ) -> None:
-        """Fill levels and share (n + k,), the empty level and 1 before, of a view at the cells fused one by one."""
+        """Fill levels and share (n + k,) of a view; those of boxes at representatives are filled before."""
         footprint, distance = self._tables.footprint[i], self._distance[i]
         if view.table is not None:
-            fill_map(cells, marked, footprint, view.table, view.assignment, distance, levels, share)
+            fill_map(i, cells, marked, footprint, view.table, view.assignment, distance, levels, share)
         elif view.fit is not None:
             share[:] = 1.0
             fill_share(cells, marked, footprint, view.assignment, distance, share)
             fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels)
+
+    def _levels_and_shares(self, shape: tuple[int, ...]) -> tuple[Levels, Singles]:
+        """Memory for levels and shares (view, n + k), valid until the next frame: large new memory is slow."""
+        number = int(np.prod(shape))
+        if len(self._memory[0]) < number:
+            self._memory = np.empty(number, np.int16), np.empty(number, np.float32)
+        levels, share = self._memory
+        return levels[:number].reshape(shape), share[:number].reshape(shape)
 
     def _volume(self, fused: _Fused) -> SparseVolume:
         number = len(fused.cells.in_volume)

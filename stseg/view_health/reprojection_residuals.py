@@ -74,10 +74,12 @@ def _of_view(people: Candidates, view: BoxView | PixelView, observation: ViewObs
     right = _right(people.ground, view)
     shifts = (-_GREATEST_RESIDUAL, 0.0, _GREATEST_RESIDUAL)
     ends = [view.table.boxes_of(people.ground + shift * right, people.height) for shift in shifts]
-    for j in np.flatnonzero(_is_separate(np.stack(ends), view)):
-        if isinstance(view, PixelView):
-            found[j] = _by_pixels(people, int(j), right[j], view, observation)
-        elif len(boxes_of_person := np.flatnonzero(owner == j)):
+    separate = np.flatnonzero(_is_separate(np.stack(ends), view))
+    if isinstance(view, PixelView):
+        found[separate] = _by_pixels(people.at(separate), right[separate], view, observation)
+        return found
+    for j in separate:
+        if len(boxes_of_person := np.flatnonzero(owner == j)):
             middles = [float(end[j, 0] + end[j, 2]) / 2 for end in ends]
             middle = float(observation.edges[boxes_of_person[0], 0] + observation.edges[boxes_of_person[0], 2]) / 2
             found[j] = np.interp(middle, middles, shifts)
@@ -102,14 +104,12 @@ def _is_separate(ends: Floats, view: View) -> Flags:
     return np.asarray(inside & ~meets.any(axis=1))
 
 
-def _by_pixels(people: Candidates, j: int, right: Floats, view: PixelView, observation: ViewObservation) -> float:
-    """Residual of one person by pixels, metres to the right."""
-    count = len(_SHIFTS)
-    places = people.ground[j] + _SHIFTS[:, None] * right
-    heights, widths = np.full(count, people.height[j]), np.full(count, people.width[j])
-    unassigned, person = np.full(view.shape, -1, np.int16), np.zeros(1, np.int64)
-    pillars = view.tried(places[None], heights[None], widths[None])
-    sums, area = view.open_sums(observation.raster, unassigned, person, pillars)
-    score = sums[0] / np.maximum(area[0], 1.0)
-    weight = np.exp(score - score.max())
-    return float(weight @ _SHIFTS / weight.sum())
+def _by_pixels(people: Candidates, right: Floats, view: PixelView, observation: ViewObservation) -> Floats:
+    """Residual of each person by pixels, float64 (n,), metres along `right` (n, 2)."""
+    places = people.ground[:, None] + _SHIFTS[:, None] * right[:, None]
+    heights, widths = (np.repeat(size[:, None], len(_SHIFTS), 1) for size in (people.height, people.width))
+    unassigned, number = np.full(view.shape, -1, np.int16), np.zeros(len(people), np.int64)
+    sums, area = view.open_sums(observation.raster, unassigned, number, view.tried(places, heights, widths))
+    score = sums / np.maximum(area, 1.0)
+    weight = np.exp(score - score.max(1, keepdims=True))
+    return np.asarray(weight @ _SHIFTS / weight.sum(1))

@@ -52,5 +52,7 @@ def _from_strong_members(estimate: MapEstimate, lattice_ground: Floats) -> MapEs
         return estimate
     more = lattice_candidates(estimate.with_members(strong), lattice_ground).new_to(estimate.pool)
     result = estimate.searched_with(more, strong)
+    if np.array_equal(result.members, estimate.members):
+        return estimate  # the same people: to refine their places once more is worth less than `_MINIMUM_GAIN`
     refined, number = refined_members(result).pool, len(result.pool)
     return result.searched_with(refined, np.arange(number, number + len(refined)))
