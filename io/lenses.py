@@ -1,14 +1,12 @@
-"""Lenses of files: their numbers are checked once for all formats."""
+"""Lenses of files: what is wrong with their numbers is said with the file and the key."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from stseg.arrays import Floats
-from stseg.errors import InputError
-from stseg.geometry.lens import COEFFICIENTS, Lens, LensModel
+from stseg.errors import CalibrationError, InputError
+from stseg.geometry.lens import Lens, LensModel
 
 
 def checked_lens(
@@ -19,9 +17,7 @@ def checked_lens(
     Coefficients beyond the model's must be zero. `error` makes the error of a key (matrix, distortion), the value found
     and the value expected.
     """
-    if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:
-        raise error("matrix", matrix.tolist(), "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
-    names, used = COEFFICIENTS[model], np.trim_zeros(distortion, "b")
-    if len(used) > len(names):
-        raise error("distortion", f"{len(distortion)} coefficients", f"at most {len(names)}: {', '.join(names)}")
-    return Lens(matrix, used, model)
+    try:
+        return Lens(matrix, distortion, model)
+    except CalibrationError as wrong:
+        raise error(wrong.key, wrong.found, wrong.expected) from None

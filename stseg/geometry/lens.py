@@ -16,6 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from stseg.arrays import Complexes, Flags, Floats
+from stseg.errors import CalibrationError
 
 LensModel = Literal["pinhole", "fisheye"]
 COEFFICIENTS: Mapping[LensModel, tuple[str, ...]] = {
@@ -41,6 +42,11 @@ class Lens:
         "fisheye" shows what lies less than 90 degrees off the axis.
     fold : float
         Tangent of the largest angle from the axis at which the radial function still rises.
+
+    Raises
+    ------
+    CalibrationError
+        Where the matrix is none of a camera, or coefficients beyond the model's are not zero.
     """
 
     matrix: Floats
@@ -49,11 +55,24 @@ class Lens:
     fold: float = field(init=False)
 
     def __post_init__(self) -> None:
-        given = np.asarray(self.distortion, float).ravel()
-        object.__setattr__(self, "matrix", np.asarray(self.matrix, float).reshape(3, 3))
+        given = np.trim_zeros(np.asarray(self.distortion, float).ravel(), "b")
+        object.__setattr__(self, "matrix", np.asarray(self.matrix, float))
+        self._require_sound(given)
         length = 4 if self.model == "fisheye" else 5 if len(given) <= 5 else 8
         object.__setattr__(self, "distortion", _filled(given, length))
         object.__setattr__(self, "fold", (_fisheye_fold if self.model == "fisheye" else _fold)(self.distortion))
+
+    def _require_sound(self, given: Floats) -> None:
+        matrix, names = self.matrix, COEFFICIENTS.get(self.model, ())
+        if not names:
+            raise CalibrationError("lens", "model", repr(self.model), f"one of {', '.join(COEFFICIENTS)}")
+        is_affine = matrix.shape == (3, 3) and matrix[1, 0] == 0 and matrix[2].tolist() == [0, 0, 1]
+        if not (is_affine and matrix[0, 0] > 0 and matrix[1, 1] > 0):
+            expected = "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]"
+            raise CalibrationError("lens", "matrix", matrix.tolist(), expected)
+        if len(given) > len(names) or not np.isfinite(given).all():
+            found = given.tolist() if len(given) <= len(names) else f"{len(given)} coefficients"
+            raise CalibrationError("lens", "distortion", found, f"at most {len(names)}, finite: {', '.join(names)}")
 
     def distort(self, pixel: Floats) -> tuple[Floats, Flags]:
         """Where the lens shows undistorted pixels.

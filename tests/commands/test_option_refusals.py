@@ -13,7 +13,8 @@ import stseg
 from stseg.arrays import Floats
 from stseg.commands.main import main
 from stseg.errors import CalibrationError, OutputError
-from stseg.geometry import Grid, Rig
+from stseg.geometry import Grid, Lens, Rig
+from stseg.geometry.lens import LensModel
 
 POINTS = "camera,u,v,x,y\ncam1,10,40,0,0\ncam1,50,40,1,0\ncam1,30,30,0,1\n"
 SCENE = "--size=64,48 --area=0,0,1,1 --frame-rate=5 -o q.toml"
@@ -95,3 +96,16 @@ def test_pages_and_their_commands_hold_names_as_text(folder: Path) -> None:
 def test_arrays_of_rigs_are_refused(ground: Floats, vertical: Floats, message: str) -> None:
     sizes, grid = [(64, 48)] * 2, Grid((0, 1), (0, 1))
     refused(CalibrationError, message, Rig.from_homographies, ground, vertical, sizes, grid, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("model", "focal", "distortion", "message"),
+    [
+        ("fish", 50.0, [0.1], "lens: model: found 'fish', expected one of pinhole, fisheye"),
+        ("fisheye", 50.0, [0.1, 0.1, 0.1, 0.1, 0.1], "distortion: found 5 coefficients, expected at most 4"),
+        ("pinhole", 50.0, [np.nan], r"distortion: found \[nan\], expected at most 8, finite"),
+        ("pinhole", np.nan, [], "matrix: found .*, expected a camera matrix"),
+    ],
+)
+def test_lenses_are_refused(model: LensModel, focal: float, distortion: list[float], message: str) -> None:
+    refused(CalibrationError, message, Lens, np.diag([focal, focal, 1.0]), np.array(distortion), model)
