@@ -10,31 +10,44 @@ import numpy as np
 
 from stseg.errors import FormatError
 from stseg.io.detections.masks import Polygons, flat_polygons
-from stseg.io.detections.record import DetectionList, Detections, Request, listed_frames, number, required_value
+from stseg.io.detections.record import (
+    DetectionList,
+    Detections,
+    Request,
+    listed_frames,
+    number,
+    require_size,
+    required_value,
+)
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_xml
 
 
 def read_cvat(request: Request) -> Detections:
-    """Boxes, polygons and masks of CVAT's XML 1.1, of a video or of images; shapes outside the image are left out."""
+    """Boxes and polygons of CVAT's XML 1.1, of a video or of images; shapes outside the image are left out."""
     root = parse_xml(request.path, "CVAT's XML: <annotations>")
     if root.tag != "annotations":
         raise FormatError(request.path, "", f"<{root.tag}>", "CVAT's XML: <annotations>")
     found, images = DetectionList(request.path), root.findall("image")
     if images:
-        frames, count = listed_frames([image.get("name", "") for image in images])
+        frames, count = listed_frames(request.path, [image.get("name", "") for image in images])
         for image, frame in zip(images, frames.tolist(), strict=True):
+            require_size(request, f"image {image.get('name')}", image.get("width"), image.get("height"))
             for shape in image:
                 _add_shape(request.path, found, f"image {image.get('name')}", frame, shape, shape.get("label", ""))
         return found.done(count)
+    for size in root.iter("original_size"):
+        require_size(request, "original_size", size.findtext("width"), size.findtext("height"))
+    if len({track.get("task_id") for track in root.findall("track")}) > 1:
+        raise FormatError(request.path, "task_id", "tracks of several tasks", "one camera, a task of its own")
     for track in root.findall("track"):
         for shape in track:
             if shape.get("outside") != "1":
                 place = f"track {track.get('id')}, frame {shape.get('frame')}"
                 frame = int(number(request.path, place, "frame", shape.get("frame", "")))
                 _add_shape(request.path, found, place, frame, shape, track.get("label", ""))
-    size = root.findtext("meta/task/size") or root.findtext("meta/job/size")
-    return found.done(int(number(request.path, "meta", "size", size)) if size else None)
+    length = root.findtext("meta/task/size") or root.findtext("meta/job/size")
+    return found.done(int(number(request.path, "meta", "size", length)) if length else None)
 
 
 def _add_shape(path: Path, found: DetectionList, place: str, frame: int, shape: Any, label: str) -> None:
@@ -45,6 +58,14 @@ def _add_shape(path: Path, found: DetectionList, place: str, frame: int, shape: 
         flat = [number(path, place, "points", word) for word in shape.get("points", "").replace(";", ",").split(",")]
         mask = _polygon(path, place, flat)
         found.add(place, frame, mask.box(), label=label, mask=mask)
+    else:
+        _refuse_area(path, place, shape.tag)
+
+
+def _refuse_area(path: Path, place: str, kind: object) -> None:
+    """FormatError for a shape that covers people but is not read; lines and points cover none."""
+    if kind in _OTHER_AREAS:
+        raise FormatError(path, place, f"a shape {kind}", "rectangles and polygons")
 
 
 def _polygon(path: Path, place: str, flat: list[float]) -> Polygons:
@@ -64,12 +85,14 @@ def read_label_studio(request: Request, data: Any) -> Detections:
     found = DetectionList(request.path)
     results = [list(_label_studio_results(request.path, k, task)) for k, task in enumerate(data)]
     videos = [one for rows in results for one in rows if one.get("type") == "videorectangle"]
+    if videos and len(data) > 1:
+        raise FormatError(request.path, "", f"{len(data)} tasks", "one camera: its video alone, or a file for each")
     if videos:
         for index, one in enumerate(videos):
             _add_video_track(request, found, f"result {index}", one["value"])
         return found.done(max((int(one["value"].get("framesCount", 0)) for one in videos), default=0) or None)
     names = [str(next(iter(task.get("data", {}).values()), k)) for k, task in enumerate(data)]
-    frames, count = listed_frames(names)
+    frames, count = listed_frames(request.path, names)
     for k, (rows, frame) in enumerate(zip(results, frames.tolist(), strict=True)):
         for index, one in enumerate(rows):
             _add_result(request, found, f"task {k}, result {index}", frame, one)
@@ -77,7 +100,11 @@ def read_label_studio(request: Request, data: Any) -> Detections:
 
 
 def _label_studio_results(path: Path, index: int, task: Any) -> Iterator[Any]:
-    for annotation in required_value(path, f"task {index}", task, "annotations"):
+    given = required_value(path, f"task {index}", task, "annotations")
+    kept = [annotation for annotation in given if not annotation.get("was_cancelled")]
+    if len(kept) > 1:
+        raise FormatError(path, f"task {index}", f"{len(kept)} annotations", "one, by one person")
+    for annotation in kept:
         yield from required_value(path, f"task {index}", annotation, "result")
 
 
@@ -93,9 +120,12 @@ def _add_result(request: Request, found: DetectionList, place: str, frame: int, 
         points = np.array(value["points"], float) / 100 * [width, height]
         mask = _polygon(request.path, place, points.ravel().tolist())
         found.add(place, frame, mask.box(), label=str(next(iter(value.get("polygonlabels", [])), "")), mask=mask)
+    else:
+        _refuse_area(request.path, place, one.get("type"))
 
 
 _PERCENT = ("x", "y", "width", "height")
+_OTHER_AREAS = ("mask", "ellipse", "cuboid", "skeleton", "circle", "brushlabels", "ellipselabels")
 
 
 def _add_video_track(request: Request, found: DetectionList, place: str, value: Any) -> None:
@@ -132,7 +162,7 @@ def is_via(data: Any) -> bool:
 def read_via(request: Request, data: Any) -> Detections:
     """Rectangles and polygons of the VGG Image Annotator (VIA 2), one image a frame."""
     images = list(data.get("_via_img_metadata", data).values())
-    frames, count = listed_frames([str(image["filename"]) for image in images])
+    frames, count = listed_frames(request.path, [str(image["filename"]) for image in images])
     found = DetectionList(request.path)
     for image, frame in zip(images, frames.tolist(), strict=True):
         regions = image["regions"]
@@ -147,4 +177,6 @@ def read_via(request: Request, data: Any) -> Detections:
                 points = np.column_stack([required_value(request.path, place, shape, f"all_points_{a}") for a in "xy"])
                 mask = _polygon(request.path, place, points.ravel().tolist())
                 found.add(place, frame, mask.box(), label=label, mask=mask)
+            else:
+                _refuse_area(request.path, place, shape.get("name"))
     return found.done(count)

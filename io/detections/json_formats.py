@@ -21,6 +21,7 @@ from stseg.io.detections.record import (
     last_numbers,
     listed_frames,
     read_json,
+    require_size,
     required_value,
 )
 
@@ -85,16 +86,17 @@ def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Map
 
 def _frames(request: Request, images: Any) -> tuple[dict[Any, int], int | None]:
     """Frame of each image id among the selected images, and their number."""
-    chosen = [
-        (required_value(request.path, f"image {k}", one, "id"), str(one.get("file_name", "")))
-        for k, one in enumerate(images)
-        if not request.source.select or fnmatch(str(one.get("file_name", "")), request.source.select)
-    ]
+    chosen = list[tuple[Any, str]]()
+    for k, one in enumerate(images):
+        number, name = required_value(request.path, f"image {k}", one, "id"), str(one.get("file_name", ""))
+        if not request.source.select or fnmatch(name, request.source.select):
+            require_size(request, f"image {k}", one.get("width"), one.get("height"))
+            chosen.append((number, name))
     if not chosen:
         raise SourceError(
             request.path, "select", f"no image like {request.source.select!r}", "a pattern of image names"
         )
-    frames, count = listed_frames([name for _, name in chosen])
+    frames, count = listed_frames(request.path, [name for _, name in chosen])
     return dict(zip((image for image, _ in chosen), frames.tolist(), strict=True)), count
 
 
@@ -168,7 +170,7 @@ def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Dete
     """Boxes of one view; -1 marks a person that the view does not show."""
     if request.source.view is None:
         raise FormatError(request.path, "view", "no number of the camera", "view = NUMBER in the rig's source, from 0")
-    frames, count = listed_frames([path.name for path in paths])
+    frames, count = listed_frames(request.path, [path.name for path in paths])
     found, has_view = DetectionList(request.path), False
     for path, frame, people in zip(paths, frames.tolist(), data, strict=True):
         for index, person in enumerate(people):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -23,7 +24,7 @@ from stseg.io.untrusted.bounded_files import parse_json, read_text
 from stseg.io.untrusted.values import abbreviated, finite_number, parse_number
 
 LEAST_NUMBERS = ("frame", "left", "top", "width", "height", "score")
-_DIGITS = re.compile(r"[0-9]+")
+_DIGITS, _LAST_DIGITS = re.compile(r"[0-9]+"), re.compile(r"[0-9]+(?=[^0-9]*\Z)")
 
 
 @dataclass(frozen=True)
@@ -196,6 +197,14 @@ def required_value(path: Path, place: str, values: Any, key: str) -> Any:
     return values[key]
 
 
+def require_size(request: Request, place: str, width: object, height: object) -> None:
+    """FormatError where a file says another size of images than the camera's; without numbers above 0 it says none."""
+    given = (parse_number(str(width)), parse_number(str(height)))
+    if min(given) > 0 and given != request.size:
+        found, expected = (f"images of {size[0]:g}x{size[1]:g}" for size in (given, request.size))
+        raise FormatError(request.path, place, found, f"{expected}, as the camera has")
+
+
 def last_numbers(names: Sequence[str]) -> Ints | None:
     """The last number in each name, int64 (n,); None where a name has none or two share one."""
     found = [_DIGITS.findall(PurePath(name).stem) for name in names]
@@ -203,14 +212,18 @@ def last_numbers(names: Sequence[str]) -> Ints | None:
     return None if len(set(numbers)) < len(names) else np.array(numbers, np.int64)
 
 
-def listed_frames(names: Sequence[str]) -> tuple[Ints, int | None]:
-    """Frames of listed images, int64 (n,), and their count.
+def listed_frames(path: Path, names: Sequence[str]) -> tuple[Ints, int | None]:
+    """Frames of images that a file lists, int64 (n,), and their count.
 
     Images at equal steps are consecutive frames, counted from 0; with unequal gaps their numbers are the frames, and
-    the count is unknown. Names without usable numbers are frames in the order of the list.
+    the count is unknown. Names without usable numbers are frames in the order of the list. FormatError where names are
+    those of several cameras, such as cam1/0.png, cam1/1.png, cam2/0.png and cam2/1.png.
     """
     numbers = last_numbers(names)
     if numbers is None:
+        series = Counter(_LAST_DIGITS.sub("", str(PurePath(name).with_suffix(""))) for name in names)
+        if len(series) > 1 and min(series.values()) > 1:
+            raise FormatError(path, "", f"images of {len(series)} cameras", "one camera: `select`, or a file for each")
         return np.arange(len(names), dtype=np.int64), len(names)
     if len(numbers) < 2:
         return np.zeros(len(numbers), np.int64), len(names)

@@ -104,6 +104,34 @@ def test_a_malformed_twin_is_one_line(tmp_path: Path, name: str, file: str, old:
     assert "\n" not in refused(InputError, message, read_source, made, SIZE)
 
 
+STUDIO = {"type": "videorectangle", "value": {"sequence": []}}
+NAMES = ("cam1/0.png", "cam1/1.png", "cam2/0.png", "cam2/1.png")
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("a.xml", "".join(f'<image name="{name}"/>' for name in NAMES), "found images of 2 cameras"),
+        ("a.xml", '<image name="a.png" width="320" height="240"/>', "image a.png: found images of 320x240"),
+        ("a.xml", "<original_size><width>9</width><height>9</height></original_size>", "found images of 9x9"),
+        ("a.xml", '<track task_id="1"/><track task_id="2"/>', "task_id: found tracks of several tasks"),
+        ("a.xml", '<image name="a.png"><mask/></image>', "image a.png: found a shape mask"),
+        ("a.json", [{"annotations": [{"result": [STUDIO]}]}] * 2, "found 2 tasks, expected one camera"),
+        ("a.json", [{"annotations": [{"result": []}] * 2}], "task 0: found 2 annotations"),
+        ("a.json", [{"annotations": [{"result": [{"type": "brushlabels"}]}]}], "result 0: found a shape brushlabels"),
+        ("a.json", [{"annotations": [{"was_cancelled": True}, {"result": [{"type": "mask"}]}]}], "shape mask"),
+        ("a.json", {"a": {"filename": "a.png", "regions": [{"shape_attributes": {"name": "circle"}}]}}, "shape circle"),
+        ("a.json", {"images": [{"id": 1, "width": 9, "height": 9}], "annotations": []}, "image 0: found images of 9x9"),
+    ],
+)  # fmt: skip
+def test_annotations_of_other_cameras_sizes_and_shapes_are_refused(
+    tmp_path: Path, file: str, content: object, message: str
+) -> None:
+    text = f"<annotations>{content}</annotations>" if file == "a.xml" else json.dumps(content)
+    (tmp_path / file).write_text(text)
+    refused(InputError, message, read_source, Source("boxes", tmp_path / file), SIZE)
+
+
 @pytest.mark.parametrize(
     ("column", "values", "message"),
     [
@@ -184,10 +212,10 @@ def test_masks_become_instances(tmp_path: Path) -> None:
 
 
 def test_images_at_equal_steps_are_consecutive_frames() -> None:
-    assert listed_frames(["a_10.png", "a_20.png", "a_0.png"])[0].tolist() == [1, 2, 0]
-    numbers, count = listed_frames(["a_10.png", "a_20.png", "a_90.png"])
+    assert listed_frames(Path("a"), ["a_10.png", "a_20.png", "a_0.png"])[0].tolist() == [1, 2, 0]
+    numbers, count = listed_frames(Path("a"), ["a_10.png", "a_20.png", "a_90.png"])
     assert numbers.tolist() == [10, 20, 90] and count is None
-    frames, count = listed_frames(["x", "y"])
+    frames, count = listed_frames(Path("a"), ["x", "y"])
     assert frames.tolist() == [0, 1] and count == 2
 
 
