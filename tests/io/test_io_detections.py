@@ -124,7 +124,7 @@ NAMES = ("cam1/0.png", "cam1/1.png", "cam2/0.png", "cam2/1.png")
         ("a.json", {"images": [{"id": 1, "width": 9, "height": 9}], "annotations": []}, "image 0: found images of 9x9"),
     ],
 )  # fmt: skip
-def test_annotations_of_other_cameras_sizes_and_shapes_are_refused(
+def test_annotations_of_other_cameras_sizes_and_shapes(
     tmp_path: Path, file: str, content: object, message: str
 ) -> None:
     text = f"<annotations>{content}</annotations>" if file == "a.xml" else json.dumps(content)

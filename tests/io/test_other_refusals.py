@@ -137,7 +137,7 @@ def test_a_film_of_a_scene_that_cannot_be_written(
     refused(OutputError, message, lambda: simulated_scene._Video(tmp_path / "a.avi", camera, 5.0, None).close())
 
 
-def test_names_of_runs_are_archived_without_escape_codes(run_path: Path) -> None:
+def test_names_are_archived_without_escape_codes(run_path: Path) -> None:
     (path := run_path.with_name("q")).touch()
     ARCHIVES["sqlite"](path, [read_run(run_path.rename(run_path.with_name("\x1b[31m.h5")))])
     assert b"\x1b[" not in path.read_bytes() and rb"\x1b[31m.h5" in path.read_bytes()
