@@ -154,7 +154,7 @@ DELAYS = [0, 4, -3]
 
 @pytest.fixture(scope="module")
 def scene() -> Walking:
-    return delayed(walking(), DELAYS)
+    return delayed(walking(seconds=26.0), DELAYS)
 
 
 @pytest.fixture(scope="module")

@@ -145,9 +145,13 @@ def test_pictures_are_written_beside_the_page(
     plain = maps | {"slices", "marginal", "overlay_left", "overlay_right"}
     assert {path.stem for path in (tmp_path / "one").iterdir()} == plain
     assert "a.html" in capsys.readouterr().out
-    report(run_path, output=tmp_path / "b.html", pictures=tmp_path / "two", frame=(10, 13))
+    (tmp_path / "two").mkdir()
+    older = tmp_path / "two" / "plan.png"
+    older.write_bytes((tmp_path / "one" / "flow.png").read_bytes())
+    report(run_path, output=tmp_path / "a.html", pictures=tmp_path / "two", frame=(10, 13), overwrite=True)
     names = {path.stem for path in (tmp_path / "two").iterdir()}
-    assert {"plan", "slices_10", "slices_13", "overlay_left_13"} <= names and "slices" not in names
+    assert {"slices_10", "slices_13", "overlay_left_13"} <= names and "slices" not in names
+    assert older.read_bytes() == (tmp_path / "one" / "plan.png").read_bytes()
 
 
 def test_truth_adds_scores_of_the_run_s_frames(run_path: Path, tmp_path: Path) -> None:
@@ -156,13 +160,6 @@ def test_truth_adds_scores_of_the_run_s_frames(run_path: Path, tmp_path: Path) -
     truth.write_text("\n".join(["frame,id,x,y", "3,1,0.1,0.1", *rows, "900,1,0.1,0.1"]))
     page = page_of(run_path, tmp_path / "a.html", truth=truth, frame=(11,))
     assert "<dt>IDF1</dt><dd>100.0 %</dd>" in page
-
-
-def test_pictures_replace_older_ones(run_path: Path, tmp_path: Path) -> None:
-    for _ in range(2):
-        report(run_path, output=tmp_path / "a.html", pictures=tmp_path / "out", overwrite=True)
-    names = ("plan", "spacetime", "slices", "flow")
-    assert all(cv2.imread(str(tmp_path / "out" / f"{name}.png")) is not None for name in names)
 
 
 def test_errors_of_the_user_are_reported(run_path: Path, tmp_path: Path) -> None:

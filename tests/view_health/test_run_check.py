@@ -197,13 +197,13 @@ def test_a_simulated_knock_is_reported_with_its_frame() -> None:
 HEIGHT = 1.7
 
 
-@pytest.fixture(params=["walkers", "laboratory", "cmc1"])
-def recording(request: pytest.FixtureRequest, tmp_path: Path) -> Recording:
+@pytest.fixture(scope="module", params=["walkers", "laboratory", "cmc1"])
+def recording(request: pytest.FixtureRequest, rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Recording:
     if request.param == "walkers":
-        return read_recording(write_recording(tmp_path))
+        return read_recording(rig_path)
     if request.param == "laboratory":
         return read_recording(data_path("laboratory/rig.toml"))
-    files, rig = sorted(data_path("cmc").glob("cam?_cam_mat.mat")), tmp_path / "rig.toml"
+    files, rig = sorted(data_path("cmc").glob("cam?_cam_mat.mat")), tmp_path_factory.mktemp("cmc1") / "rig.toml"
     where = ["--names", "Cam1,Cam2,Cam3,Cam4", "--size", "1920,1024", "--unit", "m", "--area=0,-0.4,7.67,3.6"]
     boxes = [f"--source-pattern={data_path('cmc')}/DET_CMC1_{{name}}.txt", "--source-kind=boxes", "--first-frame=1"]
     imported = ["calibrate", "import", "matrix", *map(str, files), "-o", str(rig), *where, "--frame-rate", "4", *boxes]
@@ -211,7 +211,7 @@ def recording(request: pytest.FixtureRequest, tmp_path: Path) -> Recording:
     return read_recording(rig)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def summaries(recording: Recording) -> list[SourceSummary]:
     return summarise_sources(recording)
 
