@@ -161,7 +161,6 @@ def track_recording(
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
     request |= {"--known": "nothing" if known is None else digest(people)}
     work = WorkFolder(output, request)
-    work.require_output(overwrite, Inputs(recording_files(recording), [known]))
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         if not folder.published:
             workforce.prepare()

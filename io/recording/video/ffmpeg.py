@@ -12,7 +12,6 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Condition
 
@@ -28,6 +27,8 @@ from stseg.io.untrusted import limits
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 _OPTIONS, _FILES_ONLY = "OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file"
+_turn, _openings = Condition(), list[tuple[str, str | None]]()
+"""Captures that are being opened: their options, which OpenCV takes from the environment alone, and those before."""
 
 _HEAD = 512
 _TEXT_VIDEO = b"YUV4MPEG2"
@@ -61,43 +62,26 @@ def open_video(path: Path, key: str) -> cv2.VideoCapture:
     return capture
 
 
-@dataclass
-class _Openings:
-    """Captures that are being opened now, all with the same options: OpenCV takes them from the environment alone."""
-
-    number: int = 0
-    options: str = ""
-    given: str | None = None
-    turn: Condition = field(default_factory=Condition)
-
-
-_openings = _Openings()
-
-
 @contextmanager
 def ffmpeg_options(options: str, is_default: bool = False) -> Iterator[None]:
     """FFmpeg has these options within the body, or those of the environment where these are but the default.
 
     The environment is as before afterwards. Bodies with the same options run at the same time, others one by one.
     """
-    now = _openings
-    with now.turn:
-        now.turn.wait_for(lambda: now.number == 0 or now.options == options)
-        if now.number == 0:
-            now.given, now.options = os.environ.get(_OPTIONS), options
-            if now.given is None or not is_default:
-                os.environ[_OPTIONS] = options
-        now.number += 1
+    with _turn:
+        _turn.wait_for(lambda: all(others == options for others, _ in _openings))
+        given = _openings[0][1] if _openings else os.environ.get(_OPTIONS)
+        _openings.append((options, given))
+        os.environ[_OPTIONS] = given if is_default and given is not None else options
     try:
         yield
     finally:
-        with now.turn:
-            now.number -= 1
-            if now.number == 0:
+        with _turn:
+            _openings.pop()
+            if not _openings:
                 os.environ.pop(_OPTIONS)
-                if now.given is not None:
-                    os.environ[_OPTIONS] = now.given
-                now.turn.notify_all()
+                os.environ.update({} if given is None else {_OPTIONS: given})
+                _turn.notify_all()
 
 
 def _address(path: Path, descriptor: int) -> str:

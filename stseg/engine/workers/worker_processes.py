@@ -12,7 +12,7 @@ from collections.abc import Callable
 from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
 
-from stseg.errors import ConfigError, WorkerError
+from stseg.errors import WorkerError
 from stseg.import_path import SafeChildren
 from stseg.io.machine import free_cores, free_memory
 
@@ -57,9 +57,3 @@ def started_process(target: Callable[..., None], *arguments: object) -> BaseProc
     except (OSError, EOFError) as error:
         raise WorkerError("--workers", "", f"no process that can be started ({error})", "1 process") from error
     return process
-
-
-def require_guard() -> None:
-    """Raise ConfigError in a process that, at its start, runs a script as the script's own process does."""
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        raise ConfigError("--workers", "", "a script that its workers run as well", f"{GUARD} around its calls")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing import current_process
 from pathlib import Path
 
 from stseg.engine.memory import process_memory
@@ -14,7 +15,7 @@ from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
 from stseg.engine.workers.cluster import make_by_cluster
 from stseg.engine.workers.local_workers import make_by_workers
-from stseg.engine.workers.worker_processes import FORKED, prepare_workers, processes_that_fit, require_guard
+from stseg.engine.workers.worker_processes import FORKED, GUARD, prepare_workers, processes_that_fit
 from stseg.errors import ConfigError
 from stseg.io.machine import free_cores
 
@@ -35,8 +36,8 @@ class Workforce:
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:
             raise ConfigError("--workers", "", self.workers, "1 or more processes")
-        if self.workers != 1:
-            require_guard()
+        if self.workers != 1 and getattr(current_process(), "_inheriting", False):
+            raise ConfigError("--workers", "", "a script that its workers run as well", f"{GUARD} around its calls")
 
     def processes(self, job: Job) -> int:
         """Number of processes of this machine."""
