@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -44,17 +43,18 @@ def packed_frame(values: AnyArray) -> PackedFrame:
     """A frame (plane, y, x), of the type in the file, as HDF5's filters shuffle and deflate unpack it."""
     whole = np.ascontiguousarray(values).reshape(-1)
     used = np.bitwise_or.reduce(whole.view(f"u{whole.itemsize}"), keepdims=True).view(np.uint8) != 0
-    by_significance = zip(whole.reshape(-1, 1).view(np.uint8).T, used.tolist(), strict=True)
-    return _packed([part.tobytes() if is_used else bytes(len(part)) for part, is_used in by_significance])
-
-
-def _packed(by_significance: Sequence[bytes]) -> PackedFrame:
-    """The bytes of each significance, the least first, packed."""
-    blocks, checksum = [_HEADER], 1
-    for part in by_significance:
-        blocks.append(_blocks_of_zeros(len(part)) if part == bytes(len(part)) else _blocks(part))
-        checksum = zlib.adler32(part, checksum)
+    blocks, checksum, number = [_HEADER], 1, len(whole)
+    for significance, is_used in zip(whole.reshape(-1, 1).view(np.uint8).T, used.tolist(), strict=True):
+        part = significance.tobytes() if is_used else b""
+        blocks.append(_blocks(part) if is_used else _blocks_of_zeros(number))
+        checksum = zlib.adler32(part, checksum) if is_used else _adler32_of_zeros(number, checksum)
     return PackedFrame(0, b"".join([*blocks, _END, checksum.to_bytes(4, "big")]))
+
+
+def _adler32_of_zeros(number: int, checksum: int) -> int:
+    """The checksum with so many zeros more (RFC 1950)."""
+    low, high = checksum & 0xFFFF, checksum >> 16
+    return (high + number * low) % 65521 << 16 | low
 
 
 def _blocks(values: bytes) -> bytes:

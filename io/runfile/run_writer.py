@@ -162,8 +162,10 @@ def packed_volume(log_odds: Singles, label: Labels) -> tuple[PackedFrame, Packed
     Log-odds are in nats, NaN where no view sees the cell, and kept to `layout.LOG_ODDS_STEP`; labels are track ids, and
     0 for background.
     """
-    finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
-    coarse = np.round(finite / np.float32(layout.LOG_ODDS_STEP)) * np.float32(layout.LOG_ODDS_STEP)
+    coarse = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
+    coarse /= np.float32(layout.LOG_ODDS_STEP)
+    np.rint(coarse, out=coarse)
+    coarse *= np.float32(layout.LOG_ODDS_STEP)
     whole = coarse.astype(layout.LOG_ODDS.dtype, copy=False), label.astype(layout.LABEL.dtype, copy=False)
     return packed_frame(whole[0]), packed_frame(whole[1])
 

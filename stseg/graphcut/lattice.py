@@ -51,15 +51,18 @@ def _fill_steps(successor: Labels, planes: int, forward: Labels, backward: Label
     """Fill differences of node numbers in time (node,), 0 before, by successors (time - 1, y, x)."""
     frames, rows, columns = successor.shape
     row, plane = columns + 1, (rows + 1) * (columns + 1)
+    frame, difference = (planes + 1) * plane, np.empty(columns, np.int32)
     for t in range(frames):
         for y in range(rows):
             for x in range(columns):
                 to = successor[t, y, x]
-                if to >= 0:
-                    step = (planes + 1) * plane + (to // columns - y) * row + to % columns - x
-                    for p in range(planes):
-                        node = (t * (planes + 1) + p + 1) * plane + (y + 1) * row + x + 1
-                        forward[node], backward[node + step] = step, -step
+                difference[x] = frame + (to // columns - y) * row + to % columns - x if to >= 0 else 0
+            for p in range(planes):
+                first = (t * (planes + 1) + p + 1) * plane + (y + 1) * row + 1
+                for x in range(columns):
+                    if difference[x] != 0:
+                        node = np.uint64(first + x)
+                        forward[node], backward[node + np.uint64(difference[x])] = difference[x], -difference[x]
 
 
 def node_values(volume: AnyArray) -> AnyArray:

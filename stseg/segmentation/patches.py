@@ -14,7 +14,7 @@ elsewhere a cell's successor is the same cell.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -29,7 +29,7 @@ from stseg.kernels.accelerate import kernel
 from stseg.records.sparse_volume import SparseVolume
 from stseg.segmentation.cell_motion import successor_cells
 
-SQUARE_SIDE = 8
+SQUARE_SIDE = 4
 """Cells along the side of the squares of which patches are made, and least distance of a patch's border."""
 _BETWEEN = np.float32(-30.0)
 """Log-odds of what is between patches, nats."""
@@ -39,46 +39,42 @@ EIGHT_NEIGHBOURS = np.ones((3, 3), bool)
 
 @dataclass(frozen=True)
 class GroundPatches:
-    """Rectangles of a grid's ground, beside each other on a sheet (row, column) with an empty column between them."""
+    """Parts of a grid's ground, each in a rectangle of a sheet (row, column), with nothing between them."""
 
     grid: Grid
     rectangles: tuple[tuple[slice, slice], ...]
-    """Rows and columns of the ground."""
+    """Rows and columns of the sheet."""
     place: Ints
     """int64 (row, column): ground cell of each, in the flattened ground; -1 between patches."""
 
     @classmethod
     def of(cls, grid: Grid, squares: Flags) -> Self:
         """Patches that hold the marked squares, bool (square row, square column), and all beside them."""
-        grown = np.asarray(binary_dilation(squares, EIGHT_NEIGHBOURS))
-        pieces, number = connected(grown, EIGHT_NEIGHBOURS)
-        before = number + 1
-        while number < before:
-            for piece in find_objects(pieces):
-                grown[piece] = True
-            before = number
-            pieces, number = connected(grown, EIGHT_NEIGHBOURS)
         rows, columns = grid.shape[1:]
-        return cls._arranged(
-            grid, [(_cells(down, rows), _cells(across, columns)) for down, across in find_objects(pieces)]
-        )
+        grown = binary_dilation(squares, EIGHT_NEIGHBOURS).repeat(SQUARE_SIDE, 0).repeat(SQUARE_SIDE, 1)
+        return cls._arranged(grid, np.asarray(connected(grown[:rows, :columns], EIGHT_NEIGHBOURS)[0], np.int32))
 
     @classmethod
     def whole(cls, grid: Grid) -> Self:
         """One patch, the whole ground."""
-        rows, columns = grid.shape[1:]
-        return cls._arranged(grid, [(slice(0, rows), slice(0, columns))])
+        return cls._arranged(grid, np.ones(grid.shape[1:], np.int32))
 
     @classmethod
-    def _arranged(cls, grid: Grid, rectangles: Sequence[tuple[slice, slice]]) -> Self:
-        flat = np.arange(np.prod(grid.shape[1:])).reshape(grid.shape[1:])
-        tall = max((rows.stop - rows.start for rows, _ in rectangles), default=1)
-        wide = sum(columns.stop - columns.start + 1 for _, columns in rectangles)
-        place, left = np.full((tall, max(wide - 1, 1)), -1, np.int64), 0
-        for rectangle in rectangles:
-            cells = flat[rectangle]
-            place[: cells.shape[0], left : left + cells.shape[1]] = cells
-            left += cells.shape[1] + 1
+    def _arranged(cls, grid: Grid, piece: Labels) -> Self:
+        """Patches of the pieces of the ground (y, x), numbered from 1: on shelves of a sheet, the tallest first."""
+        flat, found = np.arange(piece.size).reshape(piece.shape), find_objects(piece)
+        cells = [np.where(piece[here] == k, flat[here], -1) for k, here in enumerate(found, start=1)]
+        cells.sort(key=len, reverse=True)
+        wide = max([1, math.isqrt(sum(one.size for one in cells)), *(one.shape[1] for one in cells)])
+        rectangles, top, left, tall = [], 0, 0, len(cells[0]) if cells else 1
+        for one in cells:
+            if left + one.shape[1] > wide:
+                top, left, tall = top + tall + 1, 0, len(one)
+            rectangles.append((slice(top, top + len(one)), slice(left, left + one.shape[1])))
+            left += one.shape[1] + 1
+        place = np.full((top + tall, wide), -1, np.int64)
+        for rectangle, one in zip(rectangles, cells, strict=True):
+            place[rectangle] = one
         return cls(grid, tuple(rectangles), place)
 
     @cached_property
@@ -140,19 +136,13 @@ class GroundPatches:
 
         Motion int64 (time, row, column, 2) is that of the cells of the sheet; it stays within each patch.
         """
-        columns, left = self.place.shape[1], 0
-        sheet = np.full(motion.shape[:3], -1, np.int32)
+        columns, sheet = self.place.shape[1], np.full(motion.shape[:3], -1, np.int32)
         for down, across in self.rectangles:
-            tall, wide = down.stop - down.start, across.stop - across.start
-            cells = successor_cells(np.ascontiguousarray(motion[:, :tall, left : left + wide]))
-            to_row, to_column = np.divmod(cells, wide)
-            sheet[:, :tall, left : left + wide] = np.where(cells >= 0, to_row * columns + to_column + left, -1)
-            left += wide + 1
+            cells = successor_cells(np.ascontiguousarray(motion[:, down, across]))
+            row, column = np.divmod(cells, across.stop - across.start)
+            to = (row + down.start) * columns + column + across.start
+            sheet[:, down, across] = np.where((cells >= 0) & (self.place[down, across] >= 0), to, -1)
         return sheet
-
-
-def _cells(squares: slice, most: int) -> slice:
-    return slice(squares.start * SQUARE_SIDE, min(squares.stop * SQUARE_SIDE, most))
 
 
 def people_squares(grid: Grid, ground: Floats, ahead: Floats, reach: float) -> Flags:
