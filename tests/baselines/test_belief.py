@@ -13,7 +13,7 @@ from scenes import CONFIG, FRAME_RATE, SIZE, people
 from scipy.stats import multivariate_normal
 from strategies import cameras, examples
 
-from stseg.arrays import Boxes, Bytes, Floats, Observation
+from stseg.arrays import Bytes, Floats, Observation
 from stseg.baselines.du_piater_2006.exclusion import exclusion
 from stseg.baselines.du_piater_2006.histogram import BINS, HSV_BINS, PARTS, POINTS, histograms
 from stseg.baselines.du_piater_2006.particles import Motion, Particles, Prediction, fill_origin, systematic
@@ -24,10 +24,9 @@ from stseg.baselines.du_piater_2006.target_likelihood import TargetLikelihood, s
 from stseg.baselines.du_piater_2006.tracker import BeliefTracker
 from stseg.baselines.du_piater_2006.view import StarView
 from stseg.config import BeliefConfig
-from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.kernels.accelerate import COMPILED
-from stseg.trackers import FrameObservations, find_tracker
+from stseg.trackers import FrameObservations
 
 VIEWS = [StarView.of(camera, RIG.grid) for camera in RIG.cameras]
 MOTION = Motion(1 / FRAME_RATE, 0.5, 0.8)
@@ -262,13 +261,6 @@ def test_the_colours_lead_where_nobody_is_found() -> None:
     assert not tracker.targets
 
 
-def test_the_same_seed_makes_the_same_tracks() -> None:
-    trackers = [BeliefTracker(RIG, replace(CONFIG, belief=replace(FEW, seed=seed)), 0) for seed in (0, 0, 5)]
-    once, again, other = (rows_of(follow(tracker, 4, PASSING)) for tracker in trackers)
-    np.testing.assert_array_equal(once, again)
-    assert (once["x"] != other["x"]).any()
-
-
 def test_the_order_of_targets_does_not_matter() -> None:
     standing = people((0.0, 0.0), (0.5, 0.2))
     targets = [known(standing), known(standing[::-1])]
@@ -315,10 +307,3 @@ def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
         away[way] = float(np.hypot(*(tracker.targets[0].star.ground.mean - standing[0, :2])))
     assert away["messages"] < 0.15
     assert away["condensation"] > away["messages"]
-
-
-@pytest.mark.parametrize("observation", [np.zeros(SIZE[::-1], np.uint8), Boxes(np.zeros((0, 4)), np.zeros(0))])
-def test_without_colour_it_says_what_it_lacks(observation: Observation) -> None:
-    tracker = find_tracker("belief")(RIG, CONFIG, 0)
-    with pytest.raises(SourceError, match=r"--tracker belief.*colour"):
-        tracker.add(frame_of(0, people((0.0, 0.0))), FrameObservations((observation,) * 4, (None,) * 4))

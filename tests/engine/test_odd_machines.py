@@ -61,9 +61,10 @@ def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize("code", [errno.ENOLCK, *in_ci(errno.ENOSYS)])
-def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
-    rig = write_recording(tmp_path)
-    assert track(rig, tmp_path / "locked.h5", "--frames", "0:8") == 0
+def test_a_file_system_without_locks_serves(
+    rig_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    assert track(rig_path, tmp_path / "locked.h5", "--frames", "0:8") == 0
     opened = h5py.File.__init__
 
     def without_locks(file: h5py.File, *arguments: Any, locking: bool | None = None, **options: Any) -> None:
@@ -76,7 +77,7 @@ def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(h5py.File, "__init__", without_locks)
     monkeypatch.setattr(part_file, "flock", refused)
-    assert track(rig, tmp_path / "run.h5", "--frames", "0:8") == 0
+    assert track(rig_path, tmp_path / "run.h5", "--frames", "0:8") == 0
     (tmp_path / "answers.csv").write_text("action,frame,id,other,name\nname,,1,,Ann\n")
     for arguments in (("export", "--to", "csv"), ("correct", str(tmp_path / "answers.csv"))):
         command, *more = arguments

@@ -10,7 +10,7 @@ import pytest
 import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import compiled_only, track, write_recording
+from recordings import compiled_only, track
 from refusals import refused
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
@@ -222,10 +222,10 @@ def test_cuts_in_two_threads_at_once_agree() -> None:
 
 
 @compiled_only
-def test_real_windows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_real_windows(rig_path: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     cuts = Mock(side_effect=minimum_cut)
     monkeypatch.setitem(SOLVERS, "stseg", Solver(cuts, sparse_cut))
-    assert track(write_recording(tmp_path), tmp_path / "run.h5", "--frames", "0:10") == 0
+    assert track(rig_path, tmp_path / "run.h5", "--frames", "0:10") == 0
     assert cuts.called
     for (energy,), _ in cuts.call_args_list:
         expected = SOLVERS["pymaxflow"].grid(energy).occupied

@@ -78,15 +78,21 @@ def test_a_kernel_is_not_made_anew_for_each_number(monkeypatch: pytest.MonkeyPat
     assert len(half._inner.overloads) == 1  # type: ignore[attr-defined]
 
 
-def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
-    empty, first, second, ahead = (
-        process(program, NUMBA_CACHE_DIR=str(tmp_path)).stdout.splitlines()
-        for program in (AHEAD, PROGRAM, PROGRAM, AHEAD)
-    )
+@pytest.fixture(scope="module")
+def cached(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """A folder that holds the kernels of the program, and what the program printed that compiled them."""
+    path = tmp_path_factory.mktemp("cached")
+    return path, process(PROGRAM, NUMBA_CACHE_DIR=str(path)).stdout.splitlines()
+
+
+def test_the_cache_holds_the_kernels_that_python_calls(cached: tuple[Path, list[str]], tmp_path: Path) -> None:
+    path, first = cached
+    runs = ((AHEAD, tmp_path), (PROGRAM, path), (AHEAD, path))
+    empty, second, ahead = (process(words, NUMBA_CACHE_DIR=str(at)).stdout.splitlines() for words, at in runs)
     assert first == ["compiling kernels, once on this machine, about a minute of work", "819 0 1638 2457", "True"]
     assert second == ["819 0 1638 2457", "False"]
     assert (empty, ahead) == (["0"], ["1"])
-    assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")} == {"summed_area.fill_summed_area"}
+    assert {file.name.split("-")[0] for file in path.rglob("*.nbi")} == {"summed_area.fill_summed_area"}
 
 
 @COMPILED
@@ -97,14 +103,6 @@ def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
     assert sorted(len(lines) for lines in printed) == [2, 3]
     assert sum("compiling" in lines[0] for lines in printed) == 1
     assert [lines[-2] for lines in printed] == ["819 0 1638 2457", "819 0 1638 2457"]
-
-
-@pytest.fixture(scope="module")
-def cached(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder that holds the kernels of the program."""
-    path = tmp_path_factory.mktemp("cached")
-    process(PROGRAM, NUMBA_CACHE_DIR=str(path))
-    return path
 
 
 class Payload:
@@ -139,11 +137,11 @@ def damaged(file: Path, kind: str) -> None:
     ],
 )
 def test_files_of_the_cache_are_used_as_this_user_wrote_them(
-    cached: Path, tmp_path: Path, kind: str, files: str
+    cached: tuple[Path, list[str]], tmp_path: Path, kind: str, files: str
 ) -> None:
     if kind == "owned" and os.geteuid():
         pytest.skip("only root gives files away")
-    shutil.copytree(cached, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(cached[0], tmp_path, dirs_exist_ok=True)
     for file in tmp_path.rglob(f"*.{files}"):
         damaged(file, kind)
     anew, known = (process(PROGRAM, cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))

@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from coloured_people import RIG, rows_of
-from scenes import CONFIG, FRAME_RATE, found, people
+from coloured_people import RIG, follow, frame_of, rows_of
+from recordings import compiled_only
+from refusals import refused
+from scenes import CONFIG, FRAME_RATE, SIZE, found, no_boxes, people
 
-from stseg.arrays import Floats
-from stseg.errors import ConfigError
+from stseg.arrays import Floats, Observation, Rows
+from stseg.config import BeliefConfig, ParticleConfig
+from stseg.errors import ConfigError, SourceError
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.graphcut.grid_energy import QUANTUM
@@ -18,8 +21,9 @@ from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, Trac
 from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows, views_at
 from stseg.tracking.windows.windows import window_length, windows
 
-COLOURLESS = sorted(set(TRACKERS) - {"particles", "belief"})
-"""Trackers that need no colour; the others have tests of their own."""
+COLOURED = ("belief", "particles")
+"""Trackers that need colour; they have tests of their own."""
+COLOURLESS = sorted(set(TRACKERS) - {*COLOURED})
 UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
 """Observations for trackers without colour."""
 LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.tracking)
@@ -185,9 +189,30 @@ def test_whom_a_tracker_expects(tracker: str) -> None:
             np.testing.assert_allclose(expected.ground, [[-1.5 + 0.1 * (frame + 1), 0.2]], atol=0.02)
 
 
+@compiled_only
+@pytest.mark.parametrize("tracker", COLOURED)
+def test_equal_seeds_make_equal_tracks(tracker: str) -> None:
+    def rows(seed: int) -> Rows:
+        little = ParticleConfig(particles=6, raster_columns=64, seed=seed)
+        config = replace(CONFIG, particles=little, belief=BeliefConfig(particles=30, seed=seed))
+        return rows_of(follow(find_tracker(tracker)(RIG, config, 0), 4, ((-0.9, -0.3, 0.1, 0.0),)))
+
+    np.testing.assert_array_equal(rows(0), rows(0))
+    assert (rows(0)["x"] != rows(1)["x"]).any()
+
+
+@pytest.mark.parametrize("tracker", COLOURED)
+def test_without_colour_a_tracker_says_what_it_lacks(tracker: str) -> None:
+    masks: list[Observation] = [np.zeros(SIZE[::-1], np.uint8)] * 4
+    boxes: list[Observation] = [no_boxes()] * 4
+    for given, kind in ((masks, "masks"), (boxes, "boxes"), (masks[:2] + boxes[:2], "boxes and masks")):
+        method, seen = find_tracker(tracker)(RIG, CONFIG, 0), FrameObservations(given, [None] * 4)
+        said = f"--tracker {tracker}.*frame 3.*{kind} and no colour"
+        refused(SourceError, said, method.add, frame_of(3, people((0.0, 0.0))), seen)
+
+
 def test_an_unknown_tracker_is_refused() -> None:
-    with pytest.raises(ConfigError, match="cut, frames"):
-        find_tracker("magic")(RIG, CONFIG, 0)
+    refused(ConfigError, "cut, frames", find_tracker, "magic")
 
 
 def test_nearest_person_within_reach() -> None:

@@ -237,15 +237,6 @@ def test_predictions_before_the_first_and_after_an_empty_frame() -> None:
     assert track_filter.update(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
 
 
-def test_the_same_people_twice() -> None:
-    ways = [walk(-1.5, -0.1, 1, 0.1), walk(1.55, 0.2, -1, -0.05, 1.8), except_for(walk(0, 2, 0, -0.5), range(5, 9))]
-    (one, before), (other, after) = (follow(ways, range(20), order=4) for _ in range(2))
-    assert one == other
-    for a, b in zip(before.tracks, after.tracks, strict=True):
-        np.testing.assert_array_equal(a.state, b.state)
-        np.testing.assert_array_equal(a.covariance, b.covariance)
-
-
 def doubted(*places: tuple[float, float], evidence: float) -> People:
     """Rejected candidates."""
     return found(people(*places), evidence=evidence)
