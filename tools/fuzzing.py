@@ -9,6 +9,7 @@ Failures are printed with their seeds; the first file of each is kept in the fol
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 import time
@@ -26,12 +27,14 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--target", action="append", help="only this one; may be given several times")
+    parser.add_argument("--first", action="store_true", help="end at the first failure")
     given = parser.parse_args()
     targets = [target for target in TARGETS if not given.target or target.name in given.target]
     failed = 0
     for target in targets:
+        os.environ["PYTEST_CURRENT_TEST"] = target.name  # `tools/mutants.py` notes it
         until = time.monotonic() + 60 * given.minutes / len(targets)
-        count, failures = fuzz(target, given.seed, until, sys.maxsize - given.seed)
+        count, failures = fuzz(target, given.seed, until, sys.maxsize - given.seed, given.first)
         failed += len(failures)
         print(f"{target.name:20} {count:8} files, {len(failures)} failures", flush=True)
         for reason in dict.fromkeys(failure.reason for failure in failures):

@@ -1,11 +1,14 @@
-"""Which tests notice that a check of input is gone?
+"""Which tests, or targets of fuzzing, notice that a check of input is gone?
 
     python tools/mutants.py tests/io tests/config tests/attacks [--only io/detections] [--every 10] [--most 5]
+    python tools/mutants.py --fuzz 60 [--only io] [--every 10]
 
 A mutant lacks one check: a condition that raises is never true, a call that requires or locks is left out, an escape
 returns its text, one part of a question `is_...` is always right, a flag of `open` is not given. In a copy below build/
 the tests run once while every check is watched, also in the processes that they start: a check that refuses something
 notes the test. Then the checks are broken, one after the other, and the tests of their notes run until one fails.
+With `--fuzz` all targets of fuzzing take the tests' place, for five minutes; then, for so many seconds, the target in
+which the broken check refused most often. Checks that refuse in none are not broken.
 """
 
 from __future__ import annotations
@@ -117,12 +120,20 @@ def tests_pass(words: Sequence[str], seconds: float | None = None) -> bool:
     return False
 
 
+def fuzzing_passes(seconds: float, *words: str) -> bool:
+    """Whether fuzzing in the copy finds nothing."""
+    command = [sys.executable, "tools/fuzzing.py", "--minutes", str(seconds / 60), *words]
+    own = os.environ | {"PYTHONPATH": str(COPY)}
+    return subprocess.run(command, cwd=COPY, env=own, capture_output=True, check=False).returncode == 0
+
+
 def main() -> None:
     """Watch, then break."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="beginning of the paths whose checks are broken")
     parser.add_argument("--every", type=int, default=1, help="one of so many checks, by chance")
     parser.add_argument("--most", type=int, default=5, help="most functions of tests for a check")
+    parser.add_argument("--fuzz", type=float, help="seconds of fuzzing for each check, in place of tests")
     given, words = parser.parse_known_args()
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True)
     names = listed.stdout.splitlines()
@@ -135,7 +146,7 @@ def main() -> None:
     for name, text in texts.items():
         (COPY / name).write_text(watched(name, text))
     NOTES.unlink(missing_ok=True)
-    tests_pass(words)
+    fuzzing_passes(300) if given.fuzz else tests_pass(words)
     tests = defaultdict[str, Counter[str]](Counter)
     for noted, _, test in (line.partition(" ") for line in NOTES.read_text().splitlines()):
         tests[noted][test.partition("[")[0].partition(" (")[0]] += 1
@@ -143,6 +154,7 @@ def main() -> None:
         (COPY / name).write_text(text)
     every = [(name, k) for name, text in texts.items() for k, _ in enumerate(checks(ast.parse(text)))]
     every = [one for one in every if one[0].startswith(given.only)]
+    every = [one for one in every if not given.fuzz or f"{one[0]}#{one[1]}" in tests]
     chosen, noticed = random.Random(1).sample(every, len(every) // given.every), 0
     for name, number in sorted(chosen):
         tree = ast.parse(texts[name])
@@ -150,11 +162,14 @@ def main() -> None:
         check.replace(check.without)
         (COPY / name).write_text(ast.unparse(ast.fix_missing_locations(tree)))
         seen = [test for test, _ in tests[f"{name}#{number}"].most_common(given.most) if test]
-        is_noticed = bool(seen) and not tests_pass(["-x", *seen], 300)
+        if given.fuzz:
+            is_noticed = not fuzzing_passes(given.fuzz, "--first", "--target", seen[0])
+        else:
+            is_noticed = bool(seen) and not tests_pass(["-x", *seen], 300)
         (COPY / name).write_text(texts[name])
         noticed += is_noticed
         print(f"| {name}:{check.line} | {check.kind} | {is_noticed} | {' '.join(seen)} |", flush=True)
-    print(f"{len(chosen)} of {len(every)} checks were left out; tests noticed {100 * noticed / len(chosen):.1f} %")
+    print(f"{len(chosen)} of {len(every)} checks were left out; noticed: {100 * noticed / len(chosen):.1f} %")
 
 
 if __name__ == "__main__":

@@ -38,11 +38,11 @@ def content(target: Target, valid: bytes, seed: int) -> bytes:
     return target.mutate(valid, np.random.default_rng((seed, len(target.name), *target.name.encode())))
 
 
-def fuzz(target: Target, first: int, until: float, most: int) -> tuple[int, list[Failure]]:
-    """Seeds from `first` on, until a time or number; how many, and what failed."""
+def fuzz(target: Target, first: int, until: float, most: int, ends: bool = False) -> tuple[int, list[Failure]]:
+    """Seeds from `first` on, until a time or number, or a failure where it `ends`; how many, and what failed."""
     failures: list[Failure] = []
     seed, stop = first, first + most
-    while seed < stop and time.monotonic() < until:
+    while seed < stop and time.monotonic() < until and not (ends and failures):
         seed, failure = until_failure(target, seed, until, stop)
         if failure is not None:
             failures.append(failure)

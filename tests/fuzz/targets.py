@@ -15,7 +15,17 @@ from run_files import small_trajectory, write_small_run
 from fuzz import corpus
 from fuzz.corpus import GREY, RAMP, Maker, encoded, text
 from fuzz.mutations import mutated, mutated_objects
-from fuzz.oracles import require_boxes, require_config, require_rig, require_tracks
+from fuzz.oracles import (
+    require_answers,
+    require_areas,
+    require_boxes,
+    require_cameras,
+    require_config,
+    require_points,
+    require_rig,
+    require_run,
+    require_tracks,
+)
 from stseg.arrays import Boxes
 from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_fit import fit_points
@@ -130,7 +140,7 @@ def _in_folder(name: str, kind: SourceKind = "boxes", first: str = "", view: int
 
 
 def _cameras(format: str, path: Path) -> None:
-    read_cameras(format, [path], OPTIONS)
+    require_cameras(read_cameras(format, [path], OPTIONS))
 
 
 def _picture(kind: SourceKind) -> Reader:
@@ -146,7 +156,7 @@ def _video(path: Path) -> None:
 
 def _run(path: Path) -> None:
     run = read_run(path)
-    assert isinstance(run.names, dict)
+    require_run(run)
     for table in ("tracks", "events", "ghosts", "windows", "rates", "shifts", "timings", "committed", "appearance"):
         getattr(run, table)
     for frame in run.frames[:2].tolist():
@@ -189,19 +199,21 @@ def _live_table(path: Path) -> None:
 
 
 def _zones(path: Path) -> None:
-    for name, rings in read_polygons(path):
+    require_areas(zones := read_polygons(path))
+    for name, rings in zones:
         zone = Zone(name, rings)
         zone.contains(_GROUND)
         assert np.isfinite(zone.area)
 
 
 def _lines(path: Path) -> None:
-    for name, (points,) in read_lines(path):
+    require_areas(lines := read_lines(path))
+    for name, (points,) in lines:
         assert np.isfinite(Line(name, points).distance(_GROUND)).all()
 
 
 def _answers(path: Path) -> None:
-    rows = read_answers(path, ACTIONS)
+    require_answers(rows := read_answers(path, ACTIONS))
     answers = [Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows]
     solve_corrections(Tracks(small_trajectory()).summary(), answers)
 
@@ -214,7 +226,8 @@ def _names(path: Path) -> None:
 
 
 def _points(path: Path) -> None:
-    for table in read_points(path):
+    require_points(tables := read_points(path))
+    for table in tables:
         fit_points(table.camera, SIZE, Points(table.pixel, table.place[:, :2], table.place[:, 2]), None)
 
 
@@ -260,7 +273,7 @@ TARGETS = (
     Target("rig_file.toml", lambda path: require_rig(read_recording(path)), lambda _: text("rig.toml")),
     Target("config.toml", lambda path: require_config(read_config(path), path.parent)),
     Target("tracks.csv", lambda path: require_tracks(read_tracks_csv(path), path.parent)),
-    Target("points.csv", read_points),
+    Target("points.csv", lambda path: require_points(read_points(path))),
     Target("eight_points.csv", _points),
     Target("zones.geojson", _zones),
     Target("lines.geojson", _lines),

@@ -72,6 +72,7 @@ def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
         ("0,1,5,2,5,3,4,1", "line 3: found 8 fields, expected 6"),
         ("0.5,1,2,3,4,1", "line 3: found frame 0.5"),
         ("-1,1,2,3,4,1", "line 3: found frame -1"),
+        ("0,1e15,2,3,4,1", "line 3: found left 1e\\+15"),
         ("1e15,1,2,3,4,1", "line 3: found frame 1e\\+15"),
         ("0,1,2,3,4,87", "line 3: found score 87, expected a score of 0..1"),
         ("0,1,2,3,4,-1", "line 3: found score -1"),

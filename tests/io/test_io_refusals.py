@@ -130,6 +130,7 @@ PLANES = "1 0 0\n0 1 0\n0 0 1\n"
         ("anipose", "c.toml", POSES, "500.0", "-500.0", r"camera a, camera_matrix"),
         ("anipose", "c.toml", POSES, "rotation =", "rot =", "no camera, expected tables with matrix"),
         ("anipose", "c.toml", POSES, "[metadata]", "[metadata", "what is not TOML"),
+        ("anipose", "c.toml", "a = 1", "1", "2", "no camera, expected tables with matrix"),
         ("anipose", "c.toml", "a = 1", "1", "[]", "no camera, expected tables with matrix"),
         ("kalibr", "c.yaml", "[" * 99, "[", "[", "nested brackets"),
         ("kalibr", "c.yaml", "1: 2", "1", "3", "no table of cameras, expected one, in YAML"),
