@@ -78,8 +78,8 @@ def require_points(tables: Sequence[PointTable]) -> None:
 
 def require_areas(areas: Sequence[tuple[str, tuple[Floats, ...]]]) -> None:
     """Zones or lines."""
-    assert len(areas) <= limits.AREAS and all(is_title(name) for name, _ in areas)
-    assert max((len(part) for _, parts in areas for part in parts), default=0) <= limits.CORNERS
+    assert 0 < len({name for name, _ in areas if is_title(name)}) == len(areas) <= limits.AREAS
+    assert all(2 <= len(part) <= limits.CORNERS for _, parts in areas for part in parts)
     require_numbers(limits.METRES, *(part for _, parts in areas for part in parts))
 
 
