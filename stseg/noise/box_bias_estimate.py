@@ -1,13 +1,19 @@
 """Mean error of the lower edges of a detector's boxes, learned from people who stand free.
 
-A detector's boxes may end below the feet (amodal boxes, shadows) or above them. Several views show where a person
-stands, so the offset d of a box's lower edge from the feet is known, in shares of the body's height in the image. Over
-all views and frames its mean is
+A detector's boxes may end below the feet (amodal boxes, shadows) or above them. The offset d of a box's lower edge from
+the feet, in shares of the body's height in the image, is known where other edges show where the person stands. The
+place is not known without them: with the bias m and a place that is off by e, the offsets of lower edges and of the
+boxes' middles from those of a body at the estimated place are
 
-    m = sum w d / (sum w + w_0),
+    d_k = m - J_k e + noise,    c_k = -K_k e + noise,
 
-with weights w in seconds of one person, forgotten as all that is learned (`stseg.records.forgetting`). Boxes are
-corrected before they are observed, and offsets are those of boxes as they were delivered.
+with derivatives J, K by the place and equal noise. Least squares without e leave an information i, boxes, and i m of
+each person (Schur complement): 0 for one view, or for views that look the same way. Over all people and frames
+
+    m = sum i m / (sum i + w_0),
+
+in seconds of one person, forgotten as all that is learned (`stseg.records.forgetting`). Boxes are corrected before they
+are observed, and offsets are those of boxes as they were delivered.
 
 All views have one mean: what differs between them cannot be told from a ground that moved, and the mean errors of heads
 cannot be told from taller people.
@@ -19,8 +25,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.arrays import Boxes, ViewEvidence
-from stseg.bodies.box_fit import EDGE_GRAIN, LOWER_EDGE_BELOW, fill_offsets
+from stseg.arrays import Boxes, Floats, ViewEvidence
+from stseg.bodies.box_fit import EDGE_GRAIN, LOWER_EDGE_BELOW, MIDDLE_OFFSET, fill_offsets
 from stseg.bodies.views import View, ViewObservation
 from stseg.config import ErrorRateConfig
 from stseg.noise.box_noise_estimate import explained_boxes, whole_boxes
@@ -28,11 +34,16 @@ from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation
 
 _PRIOR_WEIGHT = 2.0
-"""w_0, weight of no error, seconds of one person: the errors of one box last for a second, and are as large."""
+"""w_0, weight of no error, seconds of one box: the errors of one box last for a second, and are as large."""
 _FREE_VISIBILITY = 0.95
 """Least share of a body that is visible where it stands free, 0..1."""
-_LARGEST_OFFSET = 0.3
-"""Largest offset that is an error and not the box of another body, shares of the height."""
+_LARGEST_OFFSET = 0.15
+"""Largest offset that is an error and not the box of another body: 2.5 standard deviations, shares of the height."""
+_STEP = 0.05
+_STEPS = _STEP * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+"""Steps on the ground by which offsets are differentiated, metres."""
+_LEAST_INFORMATION = 1e-6
+"""Information on a place without boxes, per square metre."""
 
 
 class BoxBiasEstimate:
@@ -48,7 +59,7 @@ class BoxBiasEstimate:
     Attributes
     ----------
     offsets : (2,)
-        Boxes, and offsets of their lower edges, shares of the height; both times seconds.
+        Information, boxes, and the bias times it, shares of the height; both times seconds.
     """
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
@@ -74,14 +85,39 @@ class BoxBiasEstimate:
         """Count the frame whose boxes were corrected last."""
         self.offsets.forget()
         people = explanation.people
+        information, sums = np.zeros((len(people), 3, 3)), np.zeros((len(people), 3))
         for k, person, edges, _ in explained_boxes(explanation, views, observations, self._config):
-            bodies = views[k].table.boxes_of(people.ground[person], people.height[person])
-            offsets, (width, height) = np.empty((len(edges), 4)), map(float, views[k].camera.size)
-            fill_offsets(bodies, edges, width, height, offsets)
-            delivered = offsets[:, LOWER_EDGE_BELOW] + self._corrected
-            counted = (people.visibility[k, person] >= _FREE_VISIBILITY) & (np.abs(delivered) < _LARGEST_OFFSET)
-            counts = np.array([counted.sum(), delivered[counted].sum()])
-            self.offsets.add(self.offsets.seconds(counts))
+            middle, lower = _linear_offsets(views[k], people.ground[person], people.height[person], edges)
+            lower[:, 0] += self._corrected
+            free = people.visibility[k, person] >= _FREE_VISIBILITY
+            counted = free & (np.abs(lower[:, 0]) < _LARGEST_OFFSET)
+            for offset, share in ((lower, 1.0), (middle, 0.0)):
+                row = np.column_stack([np.full(len(person), share), -offset[:, 1:]])
+                np.add.at(information, person[counted], (row[:, :, None] * row[:, None])[counted])
+                np.add.at(sums, person[counted], (row * offset[:, :1])[counted])
+        self.offsets.add(self.offsets.seconds(_without_places(information, sums)))
+
+
+def _linear_offsets(view: View, ground: Floats, height: Floats, edges: Floats) -> tuple[Floats, Floats]:
+    """Offsets of the middles and lower edges of boxes, edges (n, 4), and their change by metres in x and y: (n, 3)."""
+    width, image_height = map(float, view.camera.size)
+    found = np.empty((3, len(edges), 4))
+    for offsets, step in zip(found, _STEPS, strict=True):
+        fill_offsets(view.table.boxes_of(ground + step, height), edges, width, image_height, offsets)
+    found[1:] = (found[1:] - found[0]) / _STEP
+    found = np.nan_to_num(found)
+    return found[:, :, MIDDLE_OFFSET].T.copy(), found[:, :, -1].T.copy()
+
+
+def _without_places(information: Floats, sums: Floats) -> Floats:
+    """Information on the bias, boxes, and the bias times it, from all people: their places are not known, float64 (2,).
+
+    `information` (n, 3, 3) and `sums` (n, 3) are of the bias and of the place of each person, by equally sharp edges.
+    """
+    of_places = information[:, 1:, 1:] + _LEAST_INFORMATION * np.eye(2)
+    gain = np.linalg.solve(of_places, information[:, 1:, :1])[:, :, 0]
+    share = information[:, 0, 0] - (information[:, 0, 1:] * gain).sum(1)
+    return np.array([share.sum(), (sums[:, 0] - (sums[:, 1:] * gain).sum(1)).sum()])
 
 
 def _corrected(boxes: Boxes, bias: float, size: tuple[int, int]) -> Boxes:

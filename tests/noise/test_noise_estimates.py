@@ -104,7 +104,7 @@ def test_the_spread_of_boxes_is_found(spread: float) -> None:
     np.testing.assert_allclose(learned[:-2], PRIOR_NOISE.spread[:-2])
 
 
-@pytest.mark.parametrize("bias", [-0.05, 0.0, 0.05])
+@pytest.mark.parametrize("bias", [-0.05, 0.0, 0.05, 0.1])
 def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
     frame_pass, estimate = detector_of(room(), "boxes"), BoxBiasEstimate(RATE, CONFIG)
     standing, sizes = people((-0.5, 0.3, 1.7), (0.5, -0.4, 1.7)), [view.camera.size for view in frame_pass.views]
@@ -116,6 +116,12 @@ def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
         corrected = estimate.corrected(delivered, sizes)
         estimate.learn(frame_pass.explain(corrected, None), frame_pass.views, frame_pass.observe(corrected))
     assert estimate.bias == pytest.approx(bias, abs=0.015)
+    explanation, weight = frame_pass.explain(corrected, None), estimate.offsets.sums[0]
+    one = [np.full_like(owner, -1) if k else owner for k, owner in enumerate(explanation.box_assignment)]
+    estimate.learn(replace(explanation, box_assignment=tuple(one)), frame_pass.views, frame_pass.observe(corrected))
+    assert estimate.offsets.sums[0] == pytest.approx(
+        weight, rel=1e-3
+    )  # one view says nothing of the bias without the place
     ends = [boxes for boxes in estimate.corrected(delivered, sizes) if isinstance(boxes, Boxes)]
     feet = [boxes.pixel[:, 1] + boxes.pixel[:, 3] for boxes in ends]
     assert max(np.abs(foot - body[:, 3]).max() for foot, body in zip(feet, bodies, strict=True)) < 2.0
