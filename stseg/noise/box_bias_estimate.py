@@ -39,9 +39,9 @@ _FREE_VISIBILITY = 0.95
 """Least share of a body that is visible where it stands free, 0..1."""
 _LARGEST_OFFSET = 0.15
 """Largest offset that is an error and not the box of another body: 2.5 standard deviations, shares of the height."""
-_STEP = 0.05
-_STEPS = _STEP * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-"""Steps on the ground by which offsets are differentiated, metres."""
+_DIFFERENCE = 0.05
+_DIFFERENCES = _DIFFERENCE * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+"""Differences of places by which offsets are differentiated, metres."""
 _LEAST_INFORMATION = 1e-6
 """Information on a place without boxes, per square metre."""
 
@@ -102,9 +102,9 @@ def _linear_offsets(view: View, ground: Floats, height: Floats, edges: Floats) -
     """Offsets of the middles and lower edges of boxes, edges (n, 4), and their change by metres in x and y: (n, 3)."""
     width, image_height = map(float, view.camera.size)
     found = np.empty((3, len(edges), 4))
-    for offsets, step in zip(found, _STEPS, strict=True):
-        fill_offsets(view.table.boxes_of(ground + step, height), edges, width, image_height, offsets)
-    found[1:] = (found[1:] - found[0]) / _STEP
+    for offsets, difference in zip(found, _DIFFERENCES, strict=True):
+        fill_offsets(view.table.boxes_of(ground + difference, height), edges, width, image_height, offsets)
+    found[1:] = (found[1:] - found[0]) / _DIFFERENCE
     found = np.nan_to_num(found)
     return found[:, :, MIDDLE_OFFSET].T.copy(), found[:, :, -1].T.copy()
 

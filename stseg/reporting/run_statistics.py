@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit
 
 from stseg.arrays import Bytes, Flags, Floats, Ints, Rows
+from stseg.records.point_probability import point_probability
 
 DOUBT_LIMIT = 0.9
 """Probability below which a point is doubtful."""
@@ -45,7 +45,7 @@ class DoubtfulStretch(NamedTuple):
 def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
     """Mean probability of the points of each of `tracks`, float64 (n,), 0..1; nan for a track without points."""
     ids, place = np.unique(trajectory["id"], return_inverse=True)
-    sums, counts = np.bincount(place, _probability(trajectory), len(ids)), np.bincount(place, minlength=len(ids))
+    sums, counts = np.bincount(place, point_probability(trajectory), len(ids)), np.bincount(place, minlength=len(ids))
     means = dict(zip(ids.tolist(), (sums / np.maximum(counts, 1)).tolist(), strict=True))
     return np.array([means.get(int(track), np.nan) for track in tracks["id"]])
 
@@ -72,7 +72,7 @@ def exchange_chances(trajectory: Rows, tracks: Rows, frame_rate: float, border: 
 def doubtful_stretches(trajectory: Rows) -> list[DoubtfulStretch]:
     """Stretches of doubtful points, by track and frame."""
     rows = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    probability = _probability(rows)
+    probability = point_probability(rows)
     doubtful = np.flatnonzero(probability < DOUBT_LIMIT)
     breaks = (np.diff(rows["id"][doubtful]) != 0) | (np.diff(rows["frame"][doubtful]) > 1)
     pieces = np.split(doubtful, np.flatnonzero(breaks) + 1) if len(doubtful) else []
@@ -85,11 +85,6 @@ def doubtful_stretches(trajectory: Rows) -> list[DoubtfulStretch]:
         )
         for piece in pieces
     ]
-
-
-def _probability(rows: Rows) -> Floats:
-    """Probability of a person at each point; scores are log-odds."""
-    return np.asarray(expit(rows["score"].astype(float)))
 
 
 def people_per_minute(frames: Ints, trajectory: Rows, frame_rate: float) -> Floats:

@@ -11,6 +11,7 @@ from strategies import examples
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
+from stseg.records.point_probability import point_probability
 from stseg.records.tables import TRACK, TRAJECTORY, Tracks
 from stseg.reporting.charts import clock_time, people_chart, track_chart
 from stseg.reporting.pictures.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
@@ -67,16 +68,24 @@ def test_bars_of_tracks_never_overlap(spans: list[tuple[int, int]]) -> None:
 
 def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
     rows = trajectory_of(*((frame, track, 0, 0) for track in (1, 2) for frame in range(10)), (30, 2, 0, 0))
-    rows["score"] = 8.0
+    rows["score"], rows["views"] = 8.0, 9
     rows["score"][[3, 4, 7, 12, 20]] = 0.0
     found = doubtful_stretches(rows[::-1])
     assert [(one.track, one.first, one.last) for one in found] == [(1, 3, 4), (1, 7, 7), (2, 2, 2), (2, 30, 30)]
-    assert [one.certainty for one in found] == pytest.approx([0.5] * 4)
+    assert [one.certainty for one in found] == pytest.approx([0.5] * 4, rel=2e-3)
     tracks = table_of(TRACK, id=(1, 2, 3), last=(9, 30, 5))
-    np.testing.assert_allclose(mean_certainty(rows, tracks), [0.85, 1 - 1 / 11, np.nan], atol=1e-3)
+    np.testing.assert_allclose(mean_certainty(rows, tracks), 0.999 * np.array([0.85, 1 - 1 / 11, np.nan]), atol=1e-3)
     svg = track_chart(Span(0, 40, 5.0), tracks, found)
     assert svg.count('class="pale"') == 4
     assert "track 1, frames 3 to 4: 50 % certain" in svg
+
+
+def test_points_of_few_views_are_less_certain_by_any_score() -> None:
+    rows = trajectory_of(*((frame, 1, 0, 0) for frame in range(8)))
+    rows["score"], rows["views"] = 50.0, np.arange(8)
+    certain = point_probability(rows)
+    assert (np.diff(certain) >= 0).all()
+    assert certain[1] < 0.6 < 0.9 < certain[2] < 0.97 < 0.99 < certain[7] < 1
 
 
 def test_exchanges_are_likelier_near_ends_and_after_absence() -> None:

@@ -3,8 +3,8 @@
     python tools/experiment.py few_views [--only REGEX] [--frames 60] [--choices 6]
 
 By choices of two and three of a recording's cameras: mean and least MODA / IDF1, percent; the share of points that are
-wrong, percent; and the share that the run states itself, by the log-odds of each point. Everybody counts, also people
-that the chosen cameras cannot see: in `wildtrack` most.
+wrong, percent; and the share that the run states itself, by the score and the views of each point. Everybody counts,
+also people that the chosen cameras cannot see: in `wildtrack` most.
 WORK holds uu4.toml, cmc2.csv, cmc2.toml, cmc2_fairmot.toml, wildtrack.csv and wildtrack.toml, as tools/results.py
 leaves them. Of a rig with many cameras some choices are tried, evenly among all.
 """
@@ -26,6 +26,7 @@ from experiments.recordings import Recorded, delivered, filmed
 from stseg import Tracker
 from stseg.arrays import Flags, Rows
 from stseg.evaluation import evaluate
+from stseg.records.point_probability import point_probability
 from stseg.simulation import NAMED
 
 _CMC_AREA = (1.9, -0.3, 6.2, 3.5)
@@ -96,7 +97,7 @@ def measured(made: Recorded, chosen: tuple[int, ...]) -> Row:
     if made.area is not None:
         x0, y0, x1, y1 = made.area
         found = found[(found["x"] >= x0) & (found["x"] <= x1) & (found["y"] >= y0) & (found["y"] <= y1)]
-    wrong, stated = 1 - matched(found, truth, _GATE).mean(), (1 / (1 + np.exp(found["score"]))).mean()
+    wrong, stated = 1 - matched(found, truth, _GATE).mean(), 1 - point_probability(found).mean()
     named = "".join(str(k + 1) for k in chosen)
     return Row(named, scores.moda or 0.0, scores.idf1, 100 * wrong, 100 * stated)
 
