@@ -32,7 +32,7 @@ from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.estimates import Estimates
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate
-from stseg.noise.torn_masks import mask_log_likelihood
+from stseg.noise.torn_masks import is_unexplained, mask_log_likelihood
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
@@ -204,14 +204,15 @@ class Detector:
     def _learn_first_rims(self, learned: Estimates, observations: Observations, searches: int) -> None:
         """Learn the rims of a young session before its frame is explained, as if births cost nothing.
 
-        By what is learned so far, or by a guess of torn masks: from the explanation by which the masks are more likely.
+        If what is learned so far leaves much unexplained, a guess of torn masks is tried, too: the rims are those of
+        the explanation by which the masks are more likely.
         """
         for _ in range(searches):
-            torn = self._by_births(learned.rims.torn_guess(observations), learned)
-            if len(torn.people):
-                usual = self._by_births(learned.rims.applied(observations), learned)
-                likely = max(usual, torn, key=lambda one: mask_log_likelihood(one.pixel_assignment, observations))
-                learned.rims.learn(likely.people, self.views, observations)
+            likely = self._by_births(learned.rims.applied(observations), learned)
+            if is_unexplained(likely.pixel_assignment, observations):
+                torn = self._by_births(learned.rims.torn_guess(observations), learned)
+                likely = max(likely, torn, key=lambda one: mask_log_likelihood(one.pixel_assignment, observations))
+            learned.rims.learn(likely.people, self.views, observations)
 
     def _by_births(self, observations: Observations, learned: Estimates) -> Explanation:
         """A frame's explanation without tracks."""

@@ -28,7 +28,7 @@ from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate, without_rim
-from stseg.noise.torn_masks import mask_log_likelihood, with_rates
+from stseg.noise.torn_masks import is_unexplained, mask_log_likelihood, with_rates
 from stseg.records.people import People
 
 RATE = 5.0
@@ -351,6 +351,14 @@ def test_masks_are_most_likely_by_the_people_in_them() -> None:
         for shift in (0, 3)
     )
     assert aside < exact == 0.0
+    order = [np.cumsum(view).reshape(view.shape) % 10 for view in inside]
+    shares = [
+        np.where(view, (k < tenths) - 1, -1).astype(np.int16)
+        for tenths in (7, 8)
+        for view, k in zip(inside, order, strict=True)
+    ]
+    assert is_unexplained(shares[: len(views)], views)
+    assert not is_unexplained(shares[len(views) :], views)
 
 
 def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
