@@ -104,7 +104,7 @@ def _conditions(config: Config, tracker: str) -> Iterator[tuple[str, tuple[str, 
     if tracker not in ("cut", "frames"):
         yield "tracking.return_probability", (), "--tracker cut beside it, or the default"
     if tracker != "cut":
-        for prefix in ("segmentation.", "tracking.prediction_horizon", "tracking.assignment_distance"):
+        for prefix in ("segmentation.", "tracking.prediction_horizon"):
             yield prefix, (), "--tracker cut beside it, or the default"
 
 

@@ -41,8 +41,6 @@ class TrackingConfig(Settings):
     `context` later."""
     context: float = not_negative(1.0)
     """Time before and after a window that counts, too, when it is decided who is real, seconds; at most 30 frames."""
-    assignment_distance: float = not_negative(0.35)
-    """Distance below which two observations may be the same person in adjacent frames, metres."""
     height_noise: float = positive(0.035)
     """Error of one frame's height of a fully visible person, metres (standard deviation)."""
     width_noise: float = positive(0.03)

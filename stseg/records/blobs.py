@@ -22,13 +22,7 @@ class Blobs:
     """int64 (n,): the detected person that each blob holds, -1 for none."""
     ground: Floats
     """float64 (n, 2): centroid of the likelihood-weighted mass, metres."""
-    covariance: Floats
-    """float64 (n, 2, 2): square metres."""
     extent: Floats
     """float64 (n,): ground area, square metres."""
-    height: Floats
-    """float64 (n,): height of the uppermost occupied plane, metres."""
-    mass: Floats
-    """float64 (n,): mean log-odds of the occupied cells, nats."""
     touches: Ints
     """int64 (k, 2): pairs of blobs (counted from 0) that share one connected piece of ground."""

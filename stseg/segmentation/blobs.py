@@ -1,16 +1,13 @@
-"""Blobs: ground regions of each track in each frame, with centroid, covariance, extent and height."""
+"""Blobs: ground regions of each track in each frame."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import label as connected
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
-from stseg.geometry import Grid
 from stseg.records.blobs import UNASSIGNED, Blobs
-from stseg.segmentation.blob_measures import BlobMeasures, fill_ground_labels, fill_measures, fill_nearest
+from stseg.segmentation.blob_kernels import fill_centroids, fill_ground_labels, fill_nearest
 from stseg.segmentation.patches import EIGHT_NEIGHBOURS, GroundPatches
 
 
@@ -41,11 +38,17 @@ def find_blobs(
     person = np.full(len(track), -1, np.int64)
     holding = np.flatnonzero(nearest <= reach / 2)
     person[tracks.searchsorted(people_track[holding])] = holding
-    blobs = _measured(cells, track, person, label, log_odds, patches)
+    extent = np.bincount(cells.ravel(), minlength=len(track) + 1)[1:] * patches.grid.cell**2
+    centroid = np.zeros((len(track), 2))
+    meet = fill_centroids(cells, track, label, log_odds, patches.ground, centroid)
+    touches = _touches(cells, len(track)) if meet else np.zeros((0, 2), np.int64)
     alone = _in_volume(people_ground, log_odds, patches)
     alone[person[person >= 0]] = False
     without = np.flatnonzero(alone)
-    return _joined(blobs, without, people_ground[without], people_track[without], patches.grid)
+    return Blobs(
+        patches.on_ground(cells), np.append(track, people_track[without]), np.append(person, without),
+        np.concatenate([centroid, people_ground[without]]), np.append(extent, np.zeros(len(without))), touches,
+    )  # fmt: skip
 
 
 def _in_ground_order(occupied: Flags, place: Ints) -> tuple[Labels, int]:
@@ -73,37 +76,6 @@ def _in_volume(ground: Floats, log_odds: Singles, patches: GroundPatches) -> Fla
     place = patches.on_sheet_at[row * columns + column]
     visible = np.isfinite(log_odds.reshape(len(log_odds), -1)[:, place]).any(0)
     return np.asarray(inside & (place >= 0) & visible)
-
-
-def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid) -> Blobs:
-    """Blobs, and behind them detections (n,) as blobs without cells."""
-    if not len(person):
-        return blobs
-    none, spread = np.zeros(len(person)), np.tile(np.eye(2) * grid.cell**2 / 12, (len(person), 1, 1))
-    return replace(
-        blobs,
-        track=np.append(blobs.track, track),
-        person=np.append(blobs.person, person),
-        ground=np.concatenate([blobs.ground, ground]),
-        covariance=np.concatenate([blobs.covariance, spread]),
-        extent=np.append(blobs.extent, none),
-        height=np.append(blobs.height, none),
-        mass=np.append(blobs.mass, none),
-    )
-
-
-def _measured(
-    cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, patches: GroundPatches
-) -> Blobs:
-    n, grid = len(track), patches.grid
-    found = BlobMeasures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
-    meet = fill_measures(cells, track, label, log_odds, patches.ground, grid.heights, found)
-    covariance = found.covariance + np.eye(2) * grid.cell**2 / 12
-    extent = found.cells * grid.cell**2
-    return Blobs(
-        patches.on_ground(cells), track, person, found.ground, covariance, extent, found.height, found.mass,
-        _touches(cells, n) if meet else np.zeros((0, 2), np.int64),
-    )  # fmt: skip
 
 
 def _touches(cells: Labels, number: int) -> Ints:

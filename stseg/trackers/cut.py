@@ -94,7 +94,7 @@ class CutTracker:
             find_blobs(cells, volume, one.fused.people.ground, one.tracks, reach, patches)
             for cells, volume, one in zip(label, log_odds, frames, strict=True)
         ]
-        tracklets = form_tracklets(blobs, window.solve_first, self.config.tracking)
+        tracklets = form_tracklets(blobs, window.solve_first)
         decision = self.association.decide(window, blobs, tracklets)
         frames_of = window.index, window.solve_first, window.solve_stop, window.commit_first, window.commit_stop
         row = np.array([(*frames_of, energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
@@ -181,19 +181,11 @@ class CutTracker:
         return Commit([frames[k].fused for k in kept], named, np.concatenate(rows), event_rows(decision.events), row)
 
     def _rows(self, fused: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:
-        """TRAJECTORY rows: the detection's place where a blob holds one, else the blob's centroid."""
-        named = np.flatnonzero(identity)
-        person = blobs.person[named]
-        detected = person >= 0
-        detections = person[detected]
-        people = fused.people if len(fused.people) else None
-        ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
-        height, score = blobs.height[named].copy(), blobs.mass[named].copy()
-        width = np.full(len(named), np.nan)
-        if people is not None:
-            ground[detected], covariance[detected] = people.ground[detections], people.covariance[detections]
-            tall, wide = people.sizes.measured(self.config.body)
-            height[detected], score[detected] = tall[detections], people.evidence[detections]
-            width[detected] = wide[detections]
-        tracks = TrackPlaces(identity[named], ground, covariance, height, width, score)
+        """TRAJECTORY rows of the detections that the blobs of identities hold."""
+        named, people = np.flatnonzero(identity), fused.people
+        detected, (tall, wide) = blobs.person[named], people.sizes.measured(self.config.body)
+        ground, covariance = people.ground[detected], people.covariance[detected]
+        tracks = TrackPlaces(
+            identity[named], ground, covariance, tall[detected], wide[detected], people.evidence[detected]
+        )
         return trajectory_rows(fused.frame, tracks, blobs.extent[named], views_at(self.rig, ground))

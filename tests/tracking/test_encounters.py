@@ -158,11 +158,10 @@ LENGTH, RATE = 30, 5.0
 
 def frame_of(pairs: set[tuple[int, int]]) -> Blobs:
     """Four blobs, of which these touch."""
-    none = np.zeros((0, 2))
-    names, amounts = np.zeros(4, np.int64), np.zeros(4)
+    names = np.zeros(4, np.int64)
     touching = np.array(sorted(pairs), np.int64).reshape(-1, 2)
     cells = np.zeros((1, 1), np.int32)
-    return Blobs(cells, names, names, none, none, amounts, amounts, amounts, touching)
+    return Blobs(cells, names, names, np.zeros((4, 2)), np.zeros(4), touching)
 
 
 def told(touching: list[set[tuple[int, int]]], names: list[int], cuts: list[int]) -> Rows:

@@ -128,7 +128,7 @@ def tracklets_of(
 ) -> tuple[list[Blobs], list[Tracklet]]:
     """Blobs and tracklets of some frames; each path is a chain of its own unless `chain` says otherwise."""
     blobs = [blobs_in(paths, frame, unheld, chain) for frame in frames]
-    return blobs, form_tracklets(blobs, frames[0], CONFIG)
+    return blobs, form_tracklets(blobs, frames[0])
 
 
 FRAMES = range(40, 52)
@@ -145,27 +145,7 @@ def test_blobs_of_a_chain_are_a_piece() -> None:
             assert blobs[frame - FRAMES[0]].person[blob] >= 0
 
 
-def test_the_cut_bridges_what_a_frames_pass_missed() -> None:
-    path = walk((-2, 0), (0.4, 0), FRAMES)
-    seen = {f: p for f, p in path.items() if f not in (44, 45)}
-    _, tracklets = tracklets_of([seen], FRAMES, unheld=[{f: path[f] for f in (44, 45)}])
-    assert [tracklet.frames for tracklet in tracklets] == [list(FRAMES)]
-
-
-def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
-    """Cells that the cut gave to another track are not taken."""
-    path = walk((-2, 0), (0.4, 0), FRAMES)
-    seen = {f: p for f, p in path.items() if f != 45}
-    blobs = [blobs_in([seen], f) for f in FRAMES]
-    for owner, bridged in ((1, True), (UNASSIGNED, True), (2, False)):
-        label = np.where(column([path[45]]), owner, 0).astype(np.int32)
-        no_people = np.zeros((0, 2)), np.zeros(0, np.int64)
-        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *no_people, 0.4, GroundPatches.whole(GRID))
-        (one,) = form_tracklets(blobs, FRAMES[0], CONFIG)
-        assert (45 in one.frames) == bridged
-
-
-def test_no_piece_begins_or_ends_where_nobody_was_seen() -> None:
+def test_no_piece_has_frames_in_which_nobody_was_seen() -> None:
     path = walk((-2, 0), (0.4, 0), FRAMES)
     seen = {f: p for f, p in path.items() if 42 <= f < 50}
     rest = {f: p for f, p in path.items() if f not in seen}
@@ -181,21 +161,6 @@ def test_a_chain_is_one_piece_over_its_gap() -> None:
     assert [(one.filter_track, one.frames) for one in tracklets] == [(3, [*range(40, 45), *range(47, 52)])]
     _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 4])  # two who are followed are two
     assert [tracklet.filter_track for tracklet in tracklets] == [3, 4]
-
-
-def tracklet(chain: int, path: Path) -> Tracklet:
-    made = Tracklet(chain)
-    for frame, place in path.items():
-        made.add(frame, 0, np.array(place))
-    return made
-
-
-def test_a_gap_is_filled_in_order_and_on_the_line() -> None:
-    gappy = tracklet(1, {2: (0.0, 0.0), 6: (0.4, 0.8)})
-    np.testing.assert_allclose(gappy.between(3), [0.1, 0.2])
-    gappy.insert(3, 7, np.array([0.1, 0.2]))
-    assert (gappy.frames, gappy.blobs) == ([2, 3, 6], [0, 7, 0])
-    np.testing.assert_allclose(gappy.between(5), [0.3, 0.6])
 
 
 HALF = 4

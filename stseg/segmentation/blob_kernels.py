@@ -1,8 +1,6 @@
-"""Kernels of blobs: the label of each ground cell, the nearest cell of a person's track, and each blob's measures."""
+"""Kernels of blobs: the label of each ground cell, the nearest cell of a person's track, and centroids."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,21 +10,6 @@ from stseg.kernels.accelerate import kernel, part
 _FAINT = np.float32(1e-6)
 """Mass of a cell without evidence, nats."""
 _ZERO = np.float32(0)
-
-
-class BlobMeasures(NamedTuple):
-    """Measures of the blobs (n,) of a frame, as of `stseg.records.blobs.Blobs`."""
-
-    ground: Floats
-    """float64 (n, 2): centroid of the mass, metres."""
-    covariance: Floats
-    """float64 (n, 2, 2): the cells' spread around it, square metres."""
-    cells: Floats
-    """float64 (n,): number of ground cells."""
-    height: Floats
-    """float64 (n,): metres."""
-    mass: Floats
-    """float64 (n,): nats."""
 
 
 @part
@@ -77,53 +60,29 @@ def fill_nearest(
 
 
 @kernel
-def fill_measures(
-    cells: Labels,
-    track: Ints,
-    label: Labels,
-    log_odds: Singles,
-    ground: Floats,
-    heights: Floats,
-    found: BlobMeasures,
+def fill_centroids(
+    cells: Labels, track: Ints, label: Labels, log_odds: Singles, ground: Floats, centroid: Floats
 ) -> bool:
-    """Fill the measures of blobs, 0 everywhere before; whether any two blobs are beside each other.
+    """Fill centroid (n, 2), 0 before, with that of each blob's mass, metres; whether two blobs are beside each other.
 
     `cells` int32 (y, x) is the blob of each ground cell, counted from 1, 0 for none; `track` int64 (n,) the label of
-    the cells of each blob. `label` int32 and `log_odds` float32 (plane, y, x), nats, are of each cell. `ground` float64
-    (y, x, 2) and `heights` float64 (plane,) are in metres.
+    the cells of each blob. `label` int32 and `log_odds` float32 (plane, y, x), nats, are of each cell, and `ground`
+    float64 (y, x, 2) in metres.
     """
-    weight = np.zeros(cells.shape)
-    total, occupied, meet = np.zeros(len(track)), np.zeros(len(track)), False
+    total, meet = np.zeros(len(track)), False
     for y in range(cells.shape[0]):
         for x in range(cells.shape[1]):
             if cells[y, x] > 0:
-                b = cells[y, x] - 1
+                b, weight = cells[y, x] - 1, float(_FAINT)
                 meet = meet or _is_beside_another(cells, y, x)
-                weight[y, x] = _FAINT
-                for z in range(len(heights)):
+                for z in range(len(label)):
                     if label[z, y, x] == track[b]:
-                        strength = _strength(log_odds[z, y, x])
-                        weight[y, x] += strength if strength > _ZERO else _ZERO
-                        found.mass[b] += strength
-                        occupied[b] += 1
-                        found.height[b] = max(found.height[b], heights[z])
-                total[b] += weight[y, x]
-                found.cells[b] += 1
-                found.ground[b, 0] += weight[y, x] * ground[y, x, 0]
-                found.ground[b, 1] += weight[y, x] * ground[y, x, 1]
+                        weight += float(max(_strength(log_odds[z, y, x]), _ZERO))
+                total[b] += weight
+                centroid[b, 0] += weight * ground[y, x, 0]
+                centroid[b, 1] += weight * ground[y, x, 1]
     for b in range(len(track)):
-        found.ground[b] /= total[b]
-        found.mass[b] /= max(occupied[b], 1.0)
-    for y in range(cells.shape[0]):
-        for x in range(cells.shape[1]):
-            if cells[y, x] > 0:
-                b = cells[y, x] - 1
-                share = weight[y, x] / (total[b] * found.cells[b])
-                dx, dy = ground[y, x, 0] - found.ground[b, 0], ground[y, x, 1] - found.ground[b, 1]
-                found.covariance[b, 0, 0] += share * dx * dx
-                found.covariance[b, 0, 1] += share * dx * dy
-                found.covariance[b, 1, 0] += share * dx * dy
-                found.covariance[b, 1, 1] += share * dy * dy
+        centroid[b] /= total[b]
     return meet
 
 
