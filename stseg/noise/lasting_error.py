@@ -41,7 +41,7 @@ _SHARE_VARIANCE = 2.9
 
 @dataclass(frozen=True)
 class LastingError:
-    """Errors of some quantities, all float64 (quantity,); of one alone, (), without `mean_variance`.
+    """Errors of some quantities, all float64 (quantity,); of one alone, ().
 
     Attributes
     ----------
@@ -64,12 +64,6 @@ class LastingError:
         """Variance of a row that counts as independent of the rows of the frames around it."""
         kept = np.exp(-1.0 / (self.seconds * frame_rate))
         return np.asarray(self.white + self.lasting * (1.0 + kept) / (1.0 - kept))
-
-    def mean_variance(self, frames: Ints, frame_rate: float) -> Floats:
-        """Variance of the mean of rows in frames int64 (n,), float64 (quantity,)."""
-        lag = np.abs(frames[:, None] - frames) / frame_rate
-        alike = np.array([np.exp(-lag / seconds).mean() for seconds in self.seconds.tolist()])
-        return np.asarray(self.white / len(frames) + self.lasting * alike)
 
 
 PLACE_ERROR = LastingError(np.array(0.2), np.array(0.8), np.array(1.0))
