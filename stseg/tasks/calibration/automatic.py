@@ -120,6 +120,7 @@ def calibrate_auto(
         Where a video cannot be read, or too few people walk where several cameras see them.
     """
     output, paths, reporter = Path(output), [Path(video) for video in videos], reporter_of(progress)
+    require_output(output, overwrite, Inputs(paths))  # before videos are opened, which may be none
     streams = _streams(paths, output, frame_rate, background, source_kind)
     require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
