@@ -1,8 +1,7 @@
 """Probability that a point of a track is a person, by its score and by the number of views that see its place.
 
-A score is the evidence for a person given the others of a set. Another set may explain the views as well, by people who
-stand elsewhere, and the fewer views see a place the more such sets there are: whatever its score, a point of few views
-is wrong as often as points of so many views are.
+A score is the evidence for a person given the others of a set. Another set may explain the views as well, by people
+elsewhere, the more so the fewer views see a place: by any score, a point is wrong as often as those of as many views.
 """
 
 from __future__ import annotations
