@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import expit, ndtr
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.geometry.grid import inside_polygon
-from stseg.records.point_probability import point_probability
 
 
 @dataclass(frozen=True)
@@ -89,13 +88,13 @@ AWAY = 5.0
 def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -> Rows:
     """People in a zone in every frame of a run, COUNT (time,).
 
-    A track exists with the probability of its row (`point_probability`), and is inside with that of its place,
+    A track exists with probability 1 / (1 + exp(-score)) of its row, and is inside with that of its place,
     independently of the others; the count's mean is the sum of their products p, its variance that of p (1 - p) and of
     the square of SYSTEMATIC_SHARE of the mean.
     """
     index = np.searchsorted(frames, trajectory["frame"])
     inside = zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))
-    present = point_probability(trajectory) * zone.probability(trajectory)
+    present = expit(trajectory["score"].astype(float)) * zone.probability(trajectory)
     rows = np.zeros(len(frames), COUNT)
     rows["frame"], rows["time"], rows["zone"] = frames, frames / frame_rate, zone.name
     rows["people"] = np.bincount(index[inside], minlength=len(frames))

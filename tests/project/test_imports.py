@@ -35,7 +35,7 @@ BESIDE = {
     "trackers": {"occupancy", "segmentation", "tracking", SOLVER},
     "baselines": {"trackers", "tracking", "occupancy"},
     "evaluation": {"errors", "arrays", "geometry"},
-    "measures": {"errors", "arrays", "geometry", "records"},
+    "measures": {"errors", "arrays", "geometry"},
     "io": {"version", "errors", "arrays", "config", "geometry", "records"},
     "calibration": {"errors", "arrays", "geometry", "bodies"},
     "reporting": {"errors", "arrays", "geometry", "bodies", "records"},

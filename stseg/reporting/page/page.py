@@ -176,7 +176,7 @@ _IMAGES = (
 )
 _CERTAINTY = note(
     "A person: how certain its points are people, on average. Exchanged: the chance that the track shows another "
-    "person for a second or more. Expected calibration errors: 0.02 of the former; 0.03 of the latter on the "
+    "person for a second or more. Expected calibration errors: up to 0.04 of the former; 0.03 of the latter on the "
     "recordings it was fitted to, about 0.1 on others."
 )
 _SIGHTS = note(
