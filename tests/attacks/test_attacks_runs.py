@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from attacks import RIG, write_rig
+from cases import cases
 from recordings import COMMAND, ENVIRONMENT, in_ci
 from refusals import Command, refused
 from run_files import write_small_run
@@ -181,14 +182,7 @@ def test_simulations_are_bounded(tmp_path: Path, refusal: Command, option: tuple
     refusal("simulate", tmp_path / "scene", "--scene", "tiny", *option)
 
 
-@pytest.mark.parametrize(
-    ("shell", "status"),
-    [
-        ('"$0" COMMAND --help >&-', (0, 2)),
-        ('"$0" COMMAND --help >/dev/full', (2,)),
-        ('PYTHONIOENCODING=ascii "$0" COMMAND run "Ω.toml" -o q.h5', (2,)),
-    ],
-)
+@cases()
 def test_any_standard_output_will_do(tmp_path: Path, shell: str, status: tuple[int, ...]) -> None:
     program = shell.replace("COMMAND", f"-c '{COMMAND}'")
     command = ["sh", "-c", program, sys.executable]

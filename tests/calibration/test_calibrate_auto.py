@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import in_ci
@@ -297,15 +298,7 @@ def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.Captur
     assert "distance in a: 3.000 m instead of 3 (+0.0 %)" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"distance": ("z,1,2,3,4,5",)}, "camera,u,v,u,v,metres with a camera of a, b"),
-        ({"distance": ("a,1,2,1,2,5",)}, "two different pixels"),
-        ({"frame_rate": 0.0}, "--frame-rate"),
-        ({"frames": "9:3"}, "--frames"),
-    ],
-)
+@cases()
 def test_wrong_options_are_named(
     tmp_path: Path, options: dict[str, tuple[str, ...] | str | float], message: str
 ) -> None:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from cases import cases
 from recordings import COMMAND, ENVIRONMENT, process
 from refusals import Command
 from run_files import small_recording, small_trajectory, trajectory_of, write_run
@@ -42,17 +43,7 @@ def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
     assert bad.stderr == f"stseg: error: {tmp_path / 'none.h5'}: found no such file, expected a run file\n"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["inspekt", "x.h5"], "command line: found 'inspekt', expected one of demo, detect, run, inspect"),
-        (["inspekt"], "did you mean inspect?"),
-        (["inspect"], "RUN"),
-        (["inspect", "x.h5", "--jsn"], "--jsn"),
-        (["export", "x.h5", "--to", "docx", "-o", "x.docx"], "--to: found 'docx', expected one of csv, parquet, mot"),
-        (["--colour"], "--colour"),
-    ],
-)
+@cases()
 def test_slips_on_the_command_line_are_one_line(arguments: list[str], told: str, refusal: Command) -> None:
     assert told in refusal(*arguments)
 
@@ -131,18 +122,7 @@ def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, stdout: Command)
     assert "0.png: frame 11 (2.20 s), 0.90 m" in said[0]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--slice", "t=4,plane=0.9"], "--slice t: found 4, expected seconds of the run, 2 to 3"),
-        (["--slice", "t=nan,plane=0.9"], "--slice t: found nan, expected seconds"),
-        (["--slice", "t=2,plane=7"], "--slice plane: found 7, expected a height in metres, 0 to 1.8, or all"),
-        (["--slice", "frame=9,plane=0"], "--slice frame: found 9, expected a frame of the run, 10 to 15"),
-        (["--slice", "t=now,plane=0"], "--slice t: found 'now', expected a number"),
-        (["--slice", "t=2"], "expected t=SECONDS or frame=NUMBER, and plane=METRES or plane=all"),
-        (["--slice", "t=2,t=2,plane=0"], "expected t=SECONDS"),
-    ],
-)
+@cases()
 def test_a_slice_out_of_range_is_told(
     run_path: Path, tmp_path: Path, refusal: Command, arguments: list[str], told: str
 ) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from refusals import Command, refused
@@ -91,44 +92,12 @@ def test_any_settings_read_back_equal_from_their_text(settings: Outer) -> None:
     assert build(Outer, wrapped(tomllib.loads(as_toml(settings))), "file.toml") == settings
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ({"kind": "maps"}, "kind: found 'maps', expected one of masks, boxes"),
-        ({"quick": 1}, "quick: found 1, expected true or false"),
-        ({"count": True}, "count: found True, expected a whole number"),
-        ({"count": 3.0}, "count: found 3.0, expected a whole number"),
-        ({"inner": {"share": "much"}}, "inner.share: found 'much', expected a finite number"),
-        ({"inner": {"share": 10**400}}, "expected a finite number"),
-        ({"inner": {"share": True}}, "inner.share: found True, expected a finite number"),
-        ({"inner": {"share": 1.5}}, "inner.share: found 1.5, expected a share from 0 to 1"),
-        ({"inner": {"pair": [1]}}, "inner.pair: found [1], expected a list of 2, each a finite number"),
-        ({"inner": {"names": ["a", 2]}}, "inner.names: found ['a', 2], expected a list, each a text"),
-        ({"inner": {"limit": "x"}}, "inner.limit: found 'x', expected a whole number"),
-        ({"inner": "x"}, "inner: found 'x', expected a table"),
-        ({"count": {"a": 3}}, "count: found a table, expected a whole number"),
-        ({"cuont": 3}, "cuont: found an unknown key, expected one of kind, quick, count, inner; did you mean count?"),
-        ({"inner": {"zzz": 3}}, "inner.zzz: found an unknown key, expected one of share, pair, names, limit"),
-    ],
-)
+@cases()
 def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], message: str) -> None:
     refused(ConfigError, f"^file.toml: .*{re.escape(message)}$", build, Outer, wrapped(table), "file.toml")
 
 
-@pytest.mark.parametrize(
-    ("assignment", "message"),
-    [
-        ("detection.persn=1", "--set: detection.persn: found an unknown key"),
-        ("detectoin.prior_log_odds=1", "did you mean detection?"),
-        ("detection.prior_log_odds", "--set: found 'detection.prior_log_odds', expected section.key=value"),
-        ("prior_log_odds=1", "expected section.key=value"),
-        ("detection.=1", "expected section.key=value"),
-        ("detection.prior_log_odds=high", "--set: detection.prior_log_odds: found 'high', expected a finite number"),
-        ("detection.prior_log_odds=1\nx=2", "--set: detection.prior_log_odds: found '1\\nx=2', expected a finite"),
-        ("detection.prior_log_odds.x=1", "--set: detection.prior_log_odds: found a table"),
-        ("detection.prior_log_odds=nan", "--set: detection.prior_log_odds: found nan"),
-    ],
-)
+@cases()
 def test_wrong_assignments_name_the_option(tmp_path: Path, assignment: str, message: str) -> None:
     refused(ConfigError, re.escape(message), read, tmp_path / "c.toml", TOML, assignment)
 
@@ -180,31 +149,12 @@ def test_every_key_has_a_meaning_of_one_sentence_or_more() -> None:
         assert describe(key).endswith("."), key
 
 
-@pytest.mark.parametrize(
-    ("assignments", "tracker", "found"),
-    [
-        (("kalman.patience=3",), "cut", "a value without effect: 3.0, expected --tracker kalman"),
-        (("foreground.codebook.memory=9",), "cut", "expected foreground.model = codebook"),
-        (("foreground.model=codebook", "foreground.mixture.memory=9"), "cut", "expected foreground.model = mixture"),
-        (("proposals.kernel_radius=1",), "cut", "expected another proposals.source"),
-        (("segmentation.smoothness=1",), "kalman", "expected --tracker cut"),
-        (("tracking.return_probability=0.99",), "kalman", "expected --tracker cut"),
-    ],
-)
+@cases()
 def test_a_value_without_effect_is_refused(assignments: tuple[str, ...], tracker: str, found: str) -> None:
     refused(ConfigError, found, require_effect, read_config(None, assignments), tracker)
 
 
-@pytest.mark.parametrize(
-    ("assignments", "tracker"),
-    [
-        (("kalman.patience=3",), "kalman"),
-        (("foreground.model=codebook", "foreground.codebook.memory=9"), "cut"),
-        (("proposals.source=volume", "proposals.kernel_radius=1"), "cut"),
-        (("tracking.return_probability=0.99",), "frames"),
-        (("segmentation.smoothness=1", "kalman.patience=1"), "cut"),  # the default may be given
-    ],
-)
+@cases()
 def test_a_value_with_effect_is_taken(assignments: tuple[str, ...], tracker: str) -> None:
     require_effect(read_config(None, assignments), tracker)
 

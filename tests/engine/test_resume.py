@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import example, given, settings
 from hypothesis.strategies import integers, sampled_from
 from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, in_ci, process, run_words, started, track
@@ -164,15 +165,7 @@ def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, ha
     assert_same(halfway, undisturbed)
 
 
-@pytest.mark.parametrize(
-    ("more", "reported"),
-    [
-        (("--set", "detection.prior_log_odds=-3"), "config.detection.prior_log_odds: found -3.0, where .* has -4.0"),
-        (("--tracker", "frames"), "--tracker: found frames, where .* has cut"),
-        (("--frames", "0:20"), "--frames: found 0:20, where .* has all"),
-        (("--volume", "none"), "--volume: found none, where .* has all"),
-    ],
-)
+@cases()
 def test_another_run_is_refused_and_the_difference_named(
     rig_path: Path, halfway: Path, refusal: Command, more: tuple[str, ...], reported: str
 ) -> None:

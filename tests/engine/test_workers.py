@@ -15,6 +15,7 @@ from typing import Any
 
 import distributed
 import pytest
+from cases import cases
 from cluster import Cluster, started_cluster
 from recordings import ENVIRONMENT, FRAMES, assert_same, compiled_only, process, run_words, track, write_recording
 from refusals import Command, refused
@@ -81,17 +82,7 @@ def test_what_a_worker_finds_wrong_is_one_line(tmp_path: Path, refusal: Command)
     refusal(*run_words(rig, tmp_path / "run.h5", "--workers", "2"))
 
 
-@pytest.mark.parametrize(
-    ("script", "found"),
-    [
-        (
-            "import stseg\nstseg.track('rig.toml', workers=2)",
-            "status 1 before it began, expected a script file with",
-        ),
-        ("import os\nos._exit(0)", "status 0 before it began"),
-        ("import os\nos.kill(os.getpid(), 9)", "3 workers died while processing it, the last with status -9"),
-    ],
-)
+@cases()
 def test_workers_that_never_begin_are_not_waited_for(
     script: str,
     found: str,
@@ -182,14 +173,7 @@ def test_a_large_ground_leaves_room_for_fewer(ground_side: int, views: int, proc
     assert processes_that_fit(process_memory(rig, Config())) == processes
 
 
-@pytest.mark.parametrize(
-    ("side", "cell", "key", "remedy"),
-    [
-        (40.0, 0.05, "grid.cell: found 0.05, whose 6.4e+06 cells take about", "larger cells"),
-        (800.0, 2.0, "scene.x, scene.y: found 800 m x 800 m, which take about", "are these centimetres?"),
-        (1e8, 1e3, "scene.x, scene.y: found 1e+08 m x 1e+08 m", "are these centimetres?"),
-    ],
-)
+@cases()
 def test_a_ground_beyond_the_memory_is_refused(
     side: float, cell: float, key: str, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 from recordings import data_path
 from scenes import walkers
 
@@ -33,22 +34,11 @@ def moved(rows: Rows, factor: complex, shift: complex = 0, mirrored: bool = Fals
     return changed
 
 
-@pytest.mark.parametrize(
-    ("factor", "shift", "mirrored", "frames", "named"),
-    [
-        (1000, 0, False, 0, "in millimetres"),
-        (100, 0, False, 0, "in centimetres"),
-        (0.001, 0, False, 0, "in kilometres"),
-        (1j, 0, True, 0, "with x and y exchanged"),
-        (100j, 0, True, 0, "in centimetres with x and y exchanged"),
-        (1, 0, True, 0, "with y negated"),
-        (-1, 0, True, 0, "with x negated"),
-        (1, 0, False, 1000, r"counted from frame \+1000"),
-        (1, 0, False, -7, "counted from frame -7"),
-        (np.exp(-1j), 3 + 7j, False, 0, r"turned by 5\d degrees, scaled by (1|0\.99) and shifted \(--align\)"),
-        (2 * np.exp(-1j), 3 + 7j, False, 0, r"turned by 5\d degrees, scaled by 0\.5 and shifted \(--align\)"),
-        (1, 9, True, 0, "with y negated, turned by 0 degrees"),
-    ],
+@cases(
+    (1j, 0, True, 0, "with x and y exchanged"),
+    (100j, 0, True, 0, "in centimetres with x and y exchanged"),
+    (np.exp(-1j), 3 + 7j, False, 0, r"turned by 5\d degrees, scaled by (1|0\.99) and shifted \(--align\)"),
+    (2 * np.exp(-1j), 3 + 7j, False, 0, r"turned by 5\d degrees, scaled by 0\.5 and shifted \(--align\)"),
 )
 def test_the_reading_that_would_match_is_named(
     tracks: Rows, factor: complex, shift: complex, mirrored: bool, frames: int, named: str

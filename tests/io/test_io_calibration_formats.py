@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 from recordings import data_path
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
 from refusals import refused
@@ -299,14 +300,7 @@ class TestCommand:
         np.testing.assert_allclose(cameras[1].project(GROUND, HEIGHTS)[0], expected(1, DISTORTION), rtol=0, atol=1e-6)
         assert "calibrated in cm (guessed: --unit), +z up (guessed: --up)" in capsys.readouterr().out
 
-    @pytest.mark.parametrize(
-        ("option", "complaint"),
-        [
-            ("--size=10,10", r"--size: view0: found 10,10, expected 640,480"),
-            ("--unit=mm", r"--unit mm: found cameras 0.22 m above"),
-            ("--mirrored", r"mirrored|below the ground"),
-        ],
-    )
+    @cases()
     def test_says_what_to_mend(self, tmp_path: Path, option: str, complaint: str) -> None:
         pose_toml(tmp_path / "c.toml", "cam_")
         refused(InputError, complaint, run, "caliscope", "c.toml", "-o=r.toml", option)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from attacks import write_rig
+from cases import cases
 from refusals import refused
 
 from stseg.commands.inspect import inspect
@@ -68,33 +69,7 @@ def test_every_format_gives_the_same_boxes(tmp_path: Path, name: str) -> None:
         np.testing.assert_allclose(boxes.score, scores)
 
 
-@pytest.mark.parametrize(
-    ("name", "file", "old", "new", "message"),
-    [
-        ("Ultralytics text", "labels/walk_3.txt", "0.5\n", "x\n", r"walk_3.txt, line 1: found field 'x'"),
-        ("Ultralytics text", "labels/walk_1.txt", "1 0.5 0.5", "1 0.5 300", r"found 300, expected shares of"),
-        ("Ultralytics JSON", "r.jsonl", '"x2": 30.0, ', "", r"frame 0, detection 0: found no x2"),
-        ("COCO results", "results.json", '"image_id": 7', '"image_id": 700', r"detection 0: found image_id 700"),
-        ("COCO data set", "data.json", "12.0, 20.0, 30.0]", "12.0, 20.0]", r"detection 0: found a box of 3 numbers"),
-        ("MMDetection", "preds/000002.json", "[0, 0]", "[0]", r"frame 2: found bboxes, scores, labels and masks"),
-        ("JSON table of supervision", "sink.json", '"x_min": 5.0,', "", r"box 1: found no x_min"),
-        ("WILDTRACK", "annotations_positions/00000000.json", '"ymax": 42', '"ymax": "a"', r"person 0: found box 'a'"),
-        ("MOTChallenge truth", "gt.txt", "16.0,40.0,1,1,0.8", "16.0,40.0", r"line 3: found 6 fields, expected 9"),
-        ("MOTChallenge truth", "gt.txt", "10.0,24.0", "10.0,tall", r"line 2: found field 'tall'"),
-        ("MOTChallenge truth", "gt.txt", "3,0,5.0", "3.5,0,5.0", r"line 2: found frame 3.5, expected a whole"),
-        ("MOTChallenge truth", "gt.txt", "30.0,1,1,", "30.0,1,1.5,", r"line 1: found class 1.5, expected a whole"),
-        ("MOTChallenge truth", "gt.txt", "1,0,10.0", "0,0,10.0", r"found frame 0, expected a frame from first_frame"),
-        ("CVAT XML", "video.xml", 'xtl="10.0"', "", r"track 00, frame 0: found box ''"),
-        ("CVAT XML", "video.xml", "</annotations>", "", r"video.xml: found what is not XML"),
-        ("Label Studio", "studio.json", '"width": 25.0, ', "", r"task 0, result 0: found no width"),
-        ("VIA", "via.json", '"width": 20.0, ', "", r"f0.jpg, region 0: found no width"),
-        ("CSV", "own.csv", "0.9", "1.9", r"line 2: found score 1.9"),
-        ("CSV", "own.csv", "Bild", "Frame", r"columns.frame: found no column Bild"),
-        ("CSV with corners", "own.csv", "xmax", "far", r"header: found the columns frame_id, xmin, ymin, far"),
-        ("CSV with corners", "own.csv", "0,10.0,12.0", "0,10.0", r"line 2: found 6 fields"),
-        ("CSV with corners", "own.csv", "0,10.0,12.0", "0.5,10.0,12.0", r"line 2: found frame 0.5, expected a whole"),
-    ],
-)  # fmt: skip
+@cases()
 def test_a_malformed_twin_is_one_line(tmp_path: Path, name: str, file: str, old: str, new: str, message: str) -> None:
     made = sample(tmp_path, name)
     path = tmp_path / file
@@ -108,22 +83,7 @@ STUDIO = {"type": "videorectangle", "value": {"sequence": []}}
 NAMES = ("cam1/0.png", "cam1/1.png", "cam2/0.png", "cam2/1.png")
 
 
-@pytest.mark.parametrize(
-    ("file", "content", "message"),
-    [
-        ("a.xml", "".join(f'<image name="{name}"/>' for name in NAMES), "found images of 2 cameras"),
-        ("a.xml", '<image name="a.png" width="320" height="240"/>', "image a.png: found images of 320x240"),
-        ("a.xml", "<original_size><width>9</width><height>9</height></original_size>", "found images of 9x9"),
-        ("a.xml", '<track task_id="1"/><track task_id="2"/>', "task_id: found tracks of several tasks"),
-        ("a.xml", '<image name="a.png"><mask/></image>', "image a.png: found a shape mask"),
-        ("a.json", [{"annotations": [{"result": [STUDIO]}]}] * 2, "found 2 tasks, expected one camera"),
-        ("a.json", [{"annotations": [{"result": []}] * 2}], "task 0: found 2 annotations"),
-        ("a.json", [{"annotations": [{"result": [{"type": "brushlabels"}]}]}], "result 0: found a shape brushlabels"),
-        ("a.json", [{"annotations": [{"was_cancelled": True}, {"result": [{"type": "mask"}]}]}], "shape mask"),
-        ("a.json", {"a": {"filename": "a.png", "regions": [{"shape_attributes": {"name": "circle"}}]}}, "shape circle"),
-        ("a.json", {"images": [{"id": 1, "width": 9, "height": 9}], "annotations": []}, "image 0: found images of 9x9"),
-    ],
-)  # fmt: skip
+@cases()
 def test_annotations_of_other_cameras_sizes_and_shapes(
     tmp_path: Path, file: str, content: object, message: str
 ) -> None:
@@ -132,16 +92,7 @@ def test_annotations_of_other_cameras_sizes_and_shapes(
     refused(InputError, message, read_source, Source("boxes", tmp_path / file), SIZE)
 
 
-@pytest.mark.parametrize(
-    ("column", "values", "message"),
-    [
-        ("score", [0.9, 1.9], r"row 1: found score 1.9"),
-        ("frame", [0.0, 0.5], r"row 1: found frame 0.5, expected a whole"),
-        ("left", ["1", "far"], r"row 1: found left 'far'"),
-        ("height", [3.0, -3.0], r"row 1: found a box 4 by -3 pixels"),
-        ("width", None, r"header: found the columns frame, left, top, height, score"),
-    ],
-)
+@cases(("width", None, r"header: found the columns frame, left, top, height, score"))
 def test_a_malformed_table_of_parquet_is_one_line(
     tmp_path: Path, column: str, values: list[object] | None, message: str
 ) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from cases import cases
 from films import write_at_rate
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -249,21 +250,7 @@ def test_a_broken_image_is_named(tmp_path: Path) -> None:
     refused(SourceError, r"frame_6\.png: camera cam2, frame 1: found a broken file", shown, rec)
 
 
-@pytest.mark.parametrize(
-    ("kind", "name", "reported"),
-    [
-        ("video", "none.avi", "no such file"),
-        ("video", "hour_*.mp4", "no files"),
-        ("masks", "none.avi", "no such file"),
-        ("masks", "none", "no such file or folder"),
-        ("video", "text.avi", "found a text, such as a playlist"),
-        ("video", "empty.avi", "found a file that does not open as a video"),
-        ("images", "folder", "no images"),
-        ("instances", "text.avi", "a broken file"),
-        ("boxes", "none.csv", "No such file"),
-        ("boxes", "text.avi", "line 1"),
-    ],
-)
+@cases()
 def test_sources_that_cannot_be_read(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: SourceKind, name: str, reported: str
 ) -> None:

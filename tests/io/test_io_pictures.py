@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from cases import cases
 from films import write_at_rate
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -141,18 +142,7 @@ def test_patterns_choose_files(tmp_path: Path) -> None:
     assert [path.name for path in image_paths(folder / "view-f9-c0.png", "")] == ["view-f9-c0.png"]
 
 
-@pytest.mark.parametrize(
-    ("files", "reported"),
-    [
-        ((), "no images"),
-        (("a1.png", "a2.png", "a4.png"), "a gap after a2.png, expected running numbers in steps of 1"),
-        (("a1.png", "a01.png", "a2.png"), "a01.png and a1.png, expected each number once"),
-        (("a1.png", "a1.jpg"), "a1.jpg beside a1.png"),
-        (("a1.png", "b2.png"), "names that differ in one running number"),
-        (("a1_1.png", "a2_2.png"), "names that differ in one running number"),
-        (("a.png", "b.png"), "names that differ in one running number"),
-    ],
-)
+@cases()
 def test_folders_without_a_clear_order_are_refused(tmp_path: Path, files: tuple[str, ...], reported: str) -> None:
     names(tmp_path, *files)
     refused(SourceError, reported, image_paths, tmp_path, "camera a")

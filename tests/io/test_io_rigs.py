@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
@@ -103,72 +104,10 @@ class TestRead:
 
 
 class TestRefuse:
-    @pytest.mark.parametrize(
-        ("old", "new", "key", "found", "expected"),
-        [
-            ("format = 1", "", "format", "nothing", "whole number"),
-            ("format = 1", "format = 2", "format", "2", "1, the format"),
-            ("format = 1", "format = 1\nscnee = 3", "scnee", "unknown key", "did you mean scene?"),
-            ('name = "room"', "name = 3", "scene.name", "3", "a text"),
-            ('name = "room"', 'name = ""', "scene.name", "''", "a text"),
-            ("frame_rate = 5.0", "", "scene.frame_rate", "nothing", "a number"),
-            ("frame_rate = 5.0", "frame_rate = 0", "scene.frame_rate", "0.0", "from 0.001"),
-            ("frame_rate = 5.0", "frame_rate = true", "scene.frame_rate", "True", "a number"),
-            ("frame_rate = 5.0", "fps = 5", "scene.fps", "unknown key", "frame_rate"),
-            ("x = [-2.5, 2.5]", "x = [2.5, -2.5]", "scene.x", "[2.5, -2.5]", "lower bound"),
-            ("x = [-2.5, 2.5]", "x = [1, 1]", "scene.x", "[1.0, 1.0]", "lower bound"),
-            ("x = [-2.5, 2.5]", "x = [1]", "scene.x", "[1]", "2 numbers"),
-            ("y = [-4.5, 1.5]", "y = [-inf, 1.5]", "scene.y", "-inf", "finite"),
-            ("[scene]", "[scene]\ndoors = [[0, 0, 1]]", "scene.doors", "[", "rows of 4 numbers"),
-            ("[scene]", "[scene]\ndoors = [[1, 0, 0, 1]]", "scene.doors", "[1.0, 0.0, 0.0, 1.0]", "lower, then upper"),
-            ("[scene]", "[scene]\ndoors = [[9, 9, 9.5, 9.5]]", "scene.doors", "[9.0,", "of a part of the area"),
-            ("[scene]", '[scene]\nclosed = "yes"', "scene.closed", "'yes'", "true or false"),
-            ("polygon = [[-2.5, -4.5], ", "polygon = [", "scene.polygon", "2 corners", "3 to"),
-            ("[2.5, 1.5]]", "[2.5, 1.5, 3]]", "scene.polygon", "[", "rows of 2 numbers"),
-            ("[[-2.5, -4.5], [2.5, -4.5], [2.5, 1.5]]", "[[9, 9], [9, 8], [8, 9]]", "scene.polygon", "no cell", "over"),
-            ("[scene]", f"[scene]\ndoors = [{'[0, 0, 1, 1], ' * 1001}]", "scene.doors", "1001 doors", "at most 1000"),
-            ("[grid]", "[body]\nheight_mean = 1\nheight_spread = 0.9\n[grid]", "body.height_spread", "0.9", "half"),
-            ("[grid]", "[gird]", "gird", "unknown key", "did you mean grid?"),
-            ("cell = 0.10", "cell = -0.1", "grid.cell", "-0.1", "from 0.001"),
-            ("cell = 0.10", "cell = nan", "grid.cell", "nan", "finite"),
-            ("cell = 0.10", "cell = 0.001", "grid.cell", "0.001, which makes 5000 x 6000 cells", "at most 20000 along"),
-            ("cell = 0.10", "cell = 0.0035", "grid.cell", "0.0035, which makes 2.4e+07 cells", "at most 2e+07"),
-            ("top = 1.80", "top = 0", "grid.top", "0.0", "from 0.001"),
-            ("top = 1.80", f"top = 1{'0' * 400}", "grid.top", "1000", "a number"),
-            ("planes = 10", "planes = 0", "grid.planes", "0", "from 1"),
-            ("planes = 10", "planes = 2.5", "grid.planes", "2.5", "whole number"),
-            ('name = "cam1"', "", "camera[0].name", "nothing", "a text"),
-            ('name = "cam1"', 'name = "cam2"', "camera[1].name", "the name of camera[0]", "of its own"),
-            ("size = [644, 486]", "size = [644, 0]", ONE + "size", "[644.0, 0.0]", "whole pixels"),
-            ("size = [644, 486]", "size = [644.5, 486]", ONE + "size", "644.5", "whole pixels"),
-            ("ground = [[100, 0", "ground = [[nan, 0", ONE + "ground", "nan", "3 rows of 3 numbers"),
-            ("[0, 0, 3]]", "[0, 0]]", ONE + "ground", "[[100", "3 rows of 3 numbers"),
-            ("ground = [[100, 0, 320], [0, -100, 240], [0, 0, 3]]\n", "", ONE + "ground", "noth", "projection"),
-            ("[[camera]]", "[[camera]]\n" * 256, "camera", "257", "at most 256"),
-            ("vertical =", "verticle =", ONE + "verticle", "unknown key", "did you mean vertical?"),
-            ("vertical = [-320, -240, -1.0]\n", "", ONE + "vertical", "nothing", "3 numbers"),
-            ("projection =", "vertical = [0, 0, 1]\nprojection =", TWO + "projection", "beside", "either"),
-            ("matrix = [[490.0", "matrix = [[-490.0", ONE + "lens.matrix", "-490.0", "fx, s, cx"),
-            ("distortion = [", f"distortion = [{'1, ' * 7}", ONE + "lens.distortion", "9", "k1, k2, p1, p2, k3"),
-            ("offset = -2", 'offset = "-2"', ONE + "offset", "'-2'", "whole number"),
-            ('source = { kind = "video", path = "cam1.avi" }\n', "", ONE + "source", "nothing", "a table"),
-            ('path = "cam1.avi"', 'file = "cam1.avi"', ONE + "source.file", "unknown key", "path"),
-            ('kind = "video"', 'kind = "vidoe"', ONE + "source.kind", "'vidoe'", "did you mean video?"),
-            ('"cam1.avi"', '"cam1.avi", frames = 3', ONE + "source.frames", "unknown key", "kind, path"),
-            ('"../boxes/cam2.txt"', '["a.txt", "b.txt"]', TWO + "source.path", "2 files", "one file of boxes"),
-            ("frames = 263", "frames = 0", TWO + "source.frames", "0", "from 1"),
-            ('"blind"', '"blnd"', TWO + "on_missing", "'blnd'", "did you mean blind?"),
-            ('d = { kind = "video"', 'd = { kind = "masks"', ONE + "background.kind", "masks", "colour"),
-            ('on_missing = "blind"', 'images = { kind = "masks", path = "a" }', TWO + "images.kind", "'masks'", "vid"),
-            ('on_missing = "blind"', 'images = { kind = "boxes", path = "a" }', TWO + "images.kind", "'boxes'", "vid"),
-            ("offset = -2", 'images = { kind = "video", path = "a" }', ONE + "images.kind", "'video'", "beside a sou"),
-            ("[0, 0, 3]]", "[0, 0, 0]]", ONE + "ground", "a singular", ""),
-            ("vertical = [-320, -240, -1.0]", "vertical = [0, 0, 0]", ONE + "vertical", "", ""),
-            ("[0, 0, -1, 3]]", "[0, 0, -1, 0]]", TWO + "projection", "a singular", ""),
-            ("[0, 0, -1, 3]]", "[0, 0, 0, 3]]", TWO + "projection", "", ""),
-            ("320], [0, -100", "9e9], [0, -100", ONE + "ground", "a view", ""),
-            ("-320, 320]", "-320, 9e9]", TWO + "projection", "a view", ""),
-        ],
+    @cases(
+        ("[scene]", f"[scene]\ndoors = [{'[0, 0, 1, 1], ' * 1001}]", "scene.doors", "1001 doors", "at most 1000"),
+        ("top = 1.80", f"top = 1{'0' * 400}", "grid.top", "1000", "a number"),
+        ("[[camera]]", "[[camera]]\n" * 256, "camera", "257", "at most 256"),
     )
     def test_names_key_found_and_expected(self, old: str, new: str, key: str, found: str, expected: str) -> None:
         error = refusal(changed(old, new), InputError)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import run_files
 from browser import CHROMIUM, chromium
+from cases import cases
 from refusals import Command, refused
 from scenes import looking
 
@@ -97,17 +98,7 @@ def test_without_the_flag_a_film_holds_no_camera_pixel(run_path: Path, tmp_path:
     assert not (tmp_path / "b.mp4").exists()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ([], "nothing to write"),
-        (["--video", "a.avi"], "found the ending '.avi', expected a name that ends in .mp4"),
-        (["--video", "a.mp4", "--frames", "3:12"], "--frames: found '3:12', expected A:B"),
-        (["--video", "a.mp4", "--frames", "all"], "--frames: found 'all'"),
-        (["--frames", "10:12", "-o", "a.html"], "--video FILM.mp4 with it"),
-        (["--video", "a.mp4", "--pictures", "here"], "--pictures: found here, expected -o"),
-    ],
-)
+@cases()
 def test_slips_are_told_before_any_work(
     run_path: Path, monkeypatch: pytest.MonkeyPatch, refusal: Command, arguments: list[str], message: str
 ) -> None:

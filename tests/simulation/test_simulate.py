@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_simulate import extents, hits, shade
@@ -61,19 +62,7 @@ def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
         np.testing.assert_array_equal(dressed[k][:, 6:], clothes[0][:, 6:])
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("people", -1),
-        ("cameras", 0),
-        ("seconds", 0.0),
-        ("camera_distance", 1.0),
-        ("quality", 0),
-        ("speed", (2.0, 1.0)),
-        ("absence", -1.0),
-        ("kinds", ()),
-    ],
-)
+@cases()
 def test_scene_refuses_what_cannot_be(key: str, value: object) -> None:
     with pytest.raises(ConfigError, match=f"scene tiny: {key}"):
         replace(TINY, **{key: value})  # type: ignore[arg-type]
