@@ -75,7 +75,7 @@ def explained_by_swap(recording: Recording, first: int, warnings: list[str]) -> 
         found = check_rig(recording, frames=(first, first + _CHECKED_FRAMES))
     except InputError:
         return warnings
-    return warnings if found.check.swapped is None else [found.verdict[0]]
+    return [found.verdict[0]] if found.check.swapped else warnings
 
 
 def source_warnings(recording: Recording) -> list[str]:

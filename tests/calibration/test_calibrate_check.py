@@ -93,12 +93,12 @@ class TestVerdict:
         check, words = judged(moved(RIG, view, kind, amount))
         assert [one.view for one in check.verdict.named] == [view]
         assert words[0].startswith(f"cam{view + 1} is off: of ")
-        assert not check.delays and check.swapped is None
+        assert not check.delays and not check.swapped
 
     def test_by_how_much(self) -> None:
         check, words = judged(moved(RIG, 2, "u", 30.0))
         (view,) = check.verdict.named
-        assert view.view == 2 and not check.delays and check.swapped is None
+        assert view.view == 2 and not check.delays and not check.swapped
         assert view.pixels == pytest.approx(30.0, rel=0.2)
         assert view.right < -0.2, "the rig says further right, so people show to the left"
         assert "to the left" in words[0] and " px" in words[0]
@@ -124,12 +124,15 @@ class TestVerdict:
 
 
 class TestBlunders:
-    @pytest.mark.parametrize(("first", "second"), [(1, 3), *in_ci((0, 1))])
-    def test_swapped_streams_are_named(self, first: int, second: int) -> None:
-        check, words = judged(exchanged(RIG, first, second))
-        assert check.swapped == (first, second)
-        pair = f"cam{first + 1} and cam{second + 1}"
-        assert words[0] == f"{pair} seem to be swapped: their frames fit far better the other way round"
+    def test_swapped_streams_are_named(self) -> None:
+        check, words = judged(exchanged(RIG, 0, 1))
+        assert check.swapped == ((0, 1),)
+        assert words[0] == "cam1 and cam2 seem to be swapped: their frames fit far better the other way round"
+
+    def test_swaps_that_a_symmetric_ring_cannot_tell_apart(self) -> None:
+        check, words = judged(exchanged(RIG, 1, 3))
+        assert sorted(check.swapped) == [(0, 2), (1, 3)]
+        assert "cam2 and cam4" in words[0] and "cam1 and cam3" in words[0] and ", or " in words[0]
 
     @pytest.mark.parametrize(("view", "frames"), [(2, -3), *in_ci((0, 2))])
     def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
@@ -197,7 +200,7 @@ class TestCommand:
         swapped = replace(recording, rig=exchanged(RIG, 1, 3))
         assert explained_by_swap(recording, 0, said) == said and explained_by_swap(swapped, 0, []) == []
         (warning,) = explained_by_swap(swapped, 0, said)
-        assert warning.startswith("cam2 and cam4 seem to be swapped")
+        assert "cam2 and cam4" in warning and "seem to be swapped" in warning
 
     def test_as_json_of_some_frames(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run("check", str(rig_file), "--json", "--frames=4:40")

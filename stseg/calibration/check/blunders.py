@@ -25,6 +25,8 @@ BoxesByFrame = Mapping[int, Sequence[Floats]]
 """Boxes of every view, float64 (n, 4), by frame."""
 _SWAP_GAIN = 1.3
 """Least ratio of fitting boxes, after swapping two streams to before."""
+_SWAP_TIE = 2.0
+"""Standard deviations of the number of fitting boxes within which two swaps fit alike."""
 _FIT_DISTANCE = 0.35
 """Distance, in gates, within which a box fits a person located by all views."""
 _DELAY_MISFIT = 0.75
@@ -57,8 +59,10 @@ def find_swapped_streams(
     boxes_by_frame: BoxesByFrame,
     frames: Sequence[int],
     people: BoxCorrespondences,
-) -> tuple[int, int] | None:
-    """Two views that fit far better with their streams swapped: the best pair with images of one size.
+) -> tuple[tuple[int, int], ...]:
+    """Pairs of views, with images of one size, that fit far better with their streams swapped.
+
+    Where views stand symmetrically, another pair fits as well: the people are turned about the middle. Both are given.
 
     Parameters
     ----------
@@ -71,19 +75,20 @@ def find_swapped_streams(
 
     Returns
     -------
-    (view, view), or None
+    tuple of (view, view)
+        The best pair first; those that count as many fitting boxes, within chance, follow.
     """
-    best, pair = _SWAP_GAIN * max(_fitting_boxes(tables, people), MIN_PEOPLE), None
+    least, fits = _SWAP_GAIN * max(_fitting_boxes(tables, people), MIN_PEOPLE), {}
     for first, second in combinations(range(len(tables)), 2):
         if rig.cameras[first].size != rig.cameras[second].size:
             continue
         order = list(range(len(tables)))
         order[first], order[second] = second, first
         swapped_boxes = {frame: [boxes_by_frame[frame][view] for view in order] for frame in frames}
-        fits = _fitting_boxes(tables, match_frames(rig, tables, swapped_boxes, frames))
-        if fits > best:
-            best, pair = fits, (first, second)
-    return pair
+        fits[first, second] = _fitting_boxes(tables, match_frames(rig, tables, swapped_boxes, frames))
+    best = max(fits.values(), default=0)
+    least = max(least, best - _SWAP_TIE * best**0.5)
+    return tuple(sorted((pair for pair in fits if fits[pair] > least), key=lambda pair: -fits[pair]))
 
 
 def _fitting_boxes(tables: Sequence[BodyTable], people: BoxCorrespondences) -> int:

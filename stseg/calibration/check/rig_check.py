@@ -43,8 +43,8 @@ class Check:
     there are few."""
     lost: tuple[int, ...]
     """tuple of int: views that confirm almost no person of the others."""
-    swapped: tuple[int, int] | None
-    """Two views with swapped streams."""
+    swapped: tuple[tuple[int, int], ...]
+    """Two views with swapped streams; several pairs where the frames fit alike with each of them swapped."""
     delays: tuple[StreamDelay, ...]
     """Delayed streams; the verdict holds with their delays undone."""
     people: int
@@ -73,10 +73,8 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
         lost = tuple(np.flatnonzero(share < _LOST_CONFIRMATION * np.nanmedian(share)).tolist())
     verdict = judge(rig, tables, people)
     far = any(one.off > _SWAP_DISPLACEMENT * rig.grid.cell for one in verdict.named)
-    swapped = None
-    if lost or far or not comparable:
-        swapped = find_swapped_streams(rig, tables, boxes_by_frame, frames, people)
-    if swapped is not None:
+    swapped = find_swapped_streams(rig, tables, boxes_by_frame, frames, people) if lost or far or not comparable else ()
+    if swapped:
         return Check(Verdict((None,) * len(tables), (), None), tuple(share.tolist()), (), swapped, (), len(people))
     shifted: list[StreamDelay] = []
     most = max(1, round(_MAX_DELAY * rig.frame_rate))
@@ -88,7 +86,7 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
         people = match_frames(rig, tables, boxes_by_frame, frames)
     if shifted:
         verdict, share = judge(rig, tables, people), confirmations(tables, people)
-    return Check(verdict, tuple(share.tolist()), lost, None, tuple(shifted), len(people))
+    return Check(verdict, tuple(share.tolist()), lost, (), tuple(shifted), len(people))
 
 
 def confirmations(tables: Sequence[BodyTable], people: BoxCorrespondences) -> Floats:
@@ -106,9 +104,9 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
     """The verdict as sentences; the first says whether the rig is sound."""
     names = [camera.name for camera in rig.cameras]
     sentences = []
-    if check.swapped is not None:
-        pair = " and ".join(names[view] for view in check.swapped)
-        sentences.append(f"{pair} seem to be swapped: their frames fit far better the other way round")
+    if check.swapped:
+        pairs = ", or ".join(" and ".join(names[view] for view in pair) for pair in check.swapped)
+        sentences.append(f"{pairs} seem to be swapped: their frames fit far better the other way round")
     for one in check.delays:
         side = "late" if one.frames > 0 else "early"
         sentences.append(
@@ -116,13 +114,11 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
         )
     sentences += [disagreement_text(names[one.view], one) for one in check.verdict.named if one.view not in check.lost]
     for view in check.lost:
-        if check.swapped is None:
-            usual = 100 * float(np.nanmedian(check.confirmed))
-            sentences.append(
-                f"{names[view]} shows only {100 * check.confirmed[view]:.0f} % of the people whom others see within "
-                f"its image (usual: {usual:.0f} %): it is off by more than half a metre, blind, or not this camera's "
-                "stream"
-            )
+        usual = 100 * float(np.nanmedian(check.confirmed))
+        sentences.append(
+            f"{names[view]} shows only {100 * check.confirmed[view]:.0f} % of the people that others see within its "
+            f"image (usual: {usual:.0f} %): it is off by more than half a metre, blind, or not this camera's stream"
+        )
     if check.verdict.unresolved is not None:
         first_view, second_view = check.verdict.unresolved
         sentences.append(
@@ -130,7 +126,7 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
             "views alone do not tell which of them is off"
         )
     silent = [name for name, one in zip(names, check.verdict.views, strict=True) if one is None]
-    if silent and check.swapped is None:
+    if silent and not check.swapped:
         sentences.append(f"too few people stand alone before {', '.join(silent)} to judge (fewer than {MIN_PEOPLE})")
     if not sentences:
         worst = max((one for one in check.verdict.views if one is not None), key=lambda one: one.off)

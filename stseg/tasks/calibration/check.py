@@ -88,7 +88,7 @@ class RigCheck:
             "sound": check.sound,
             "words": list(self.verdict),
             "off": [names[one.view] for one in check.verdict.named],
-            "swapped": [] if check.swapped is None else [names[view] for view in check.swapped],
+            "swapped": [[names[view] for view in pair] for pair in check.swapped],
             "late": {names[one.view]: one.frames for one in check.delays},
             "people": check.people,
             "views": dict(zip(names, views, strict=True)),
