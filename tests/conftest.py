@@ -1,7 +1,10 @@
 """Settings of all tests, and what tests of many rooms begin with."""
 
+import os
 import time
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in commands: its threads wait for work by spinning
 
 import pytest
 from hypothesis import HealthCheck, settings
