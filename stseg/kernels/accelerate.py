@@ -55,11 +55,6 @@ def part(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function, forceinline=True)
 
 
-def python_form(compiled: Callable[P, R]) -> Callable[P, R]:
-    """The kernel as plain Python, for tests that compare the two."""
-    return cast("Callable[P, R]", getattr(compiled, "py_func", compiled))
-
-
 @contextmanager
 def compilation_noted(note: Callable[[str], None]) -> Iterator[None]:
     """Call `note` with a line where a kernel is compiled within the body, and then every ten seconds."""
@@ -106,7 +101,7 @@ def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
     if FAST:
         compiled = fast_compile.Kernel(function, options)
     else:
-        compiled = numba.njit(nogil=True, **options)(function)
+        compiled = numba.njit(nogil=True, **options | {"no_cfunc_wrapper": True})(function)
         with suppress(RuntimeError):  # no folder can be written to: compiled in each process
             compiled._cache = KernelCache(function)
     _kernels.append(compiled)

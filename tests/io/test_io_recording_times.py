@@ -5,22 +5,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from films import TICK, Film, regular, standing, write_at_rate, write_films
-from recordings import assert_same
+from recordings import assert_same, compiled_only
 from scenes import FRAME_RATE
 
 from stseg.arrays import Floats
 from stseg.commands.main import main
 from stseg.config import Config, SegmentConfig
-from stseg.detection.score.gains import gain
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.frames import read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.runs import Run, read_run
-from stseg.kernels.accelerate import python_form
 
-pytestmark = pytest.mark.skipif(python_form(gain) is gain, reason="too slow without a compiler")
+pytestmark = compiled_only
 
 QUICK = ("--set", "detection.lattice_spacing=0.25", "--set", "body.heights=[1.6,1.7,1.8]")
 SHORT = ("--set", "segments.length=3", "--set", "segments.warm_up=1")

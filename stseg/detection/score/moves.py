@@ -10,7 +10,7 @@ from stseg.detection.problem import DetectionProblem, RaggedArray
 from stseg.detection.score.box_state import link
 from stseg.detection.score.gains import fill_evidence, gain
 from stseg.detection.score.pixel_state import assign_pixels, reassign_pixels, release_pixels
-from stseg.detection.score.set_state import Kept, SetState, set_state
+from stseg.detection.score.set_state import NO_MEMBER, Kept, SetState, set_state
 from stseg.detection.score.track_state import assign_track, linked_tracks, release_track
 from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.pointed_tuples import pointed
@@ -19,7 +19,7 @@ from stseg.kernels.pointed_tuples import pointed
 @kernel
 def add(i: int, place: int, state: SetState) -> None:
     """Add candidate i to the set at a place, from where the member goes to the last one."""
-    state.total[0] += gain(i, -1, state)
+    state.total[0] += gain(i, NO_MEMBER, state)
     _forget(i, state)
     put(i, place, state)
 
@@ -27,7 +27,7 @@ def add(i: int, place: int, state: SetState) -> None:
 @kernel
 def remove(place: int, state: SetState) -> None:
     """Remove the member at a place from the set; the last member moves there."""
-    state.total[0] -= gain(state.members[place], -1, state)
+    state.total[0] -= gain(state.members[place], NO_MEMBER, state)
     _forget(withdraw(place, state), state)
 
 
@@ -144,7 +144,7 @@ def _fill_gains(
         add(i, state.size[0], state)
     for k in range(len(candidates)):
         i, place, is_member = candidates[k], 0, state.inside[candidates[k]]
-        gains[k] = gain(i, -1, state)
+        gains[k] = gain(i, NO_MEMBER, state)
         while is_member and state.members[place] != i:
             place += 1
         if is_member:

@@ -7,7 +7,7 @@ that of tracks along one path (`track_state`): with the set's assignment at hand
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from stseg.detection.score.scoring import contact_limit, pair_cost
 from stseg.detection.score.track_state import TrackAssignment, track_state
 from stseg.kernels.accelerate import kernel
 
+NO_MEMBER = cast("int", np.int64(-1))
+"""In place of a member. For -1 as it is numba would compile kernels anew, as for a type of its own."""
 REPLACEMENT_DISTANCE = 0.7
 """A member is replaced by candidates at most this far away, metres: more is another person."""
 

@@ -13,7 +13,7 @@ from stseg.arrays import Flags, Ints
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.gains import gain
 from stseg.detection.score.moves import add, copy_of, put, remove, return_to, withdraw
-from stseg.detection.score.set_state import REPLACEMENT_DISTANCE, SetState
+from stseg.detection.score.set_state import NO_MEMBER, REPLACEMENT_DISTANCE, SetState
 from stseg.detection.search.groups import mark_interacting
 from stseg.kernels.accelerate import kernel, part
 
@@ -36,7 +36,7 @@ def local_search(group: Ints, in_group: Flags, state: SetState) -> None:
     for _ in range(_SWEEP_LIMIT if state.remaining[0] > 0 else 0):
         before = state.moves[0]
         _add_best(group, state)
-        _remove_worthless(-1, state.inside, state)
+        _remove_worthless(NO_MEMBER, state.inside, state)
         _replace(in_group, state)
         if state.moves[0] == before:
             break
@@ -105,7 +105,7 @@ def _insert_and_prune(i: int, partners: Flags, state: SetState) -> bool:
 
     Where just one nearby member is removed, that is a simple replacement, which was tried.
     """
-    if gain(i, -1, state) < _INSERTION_GAIN:
+    if gain(i, NO_MEMBER, state) < _INSERTION_GAIN:
         return False
     before = state.members[: state.size[0]].copy()
     add(i, state.size[0], state)
@@ -124,11 +124,11 @@ def _add_best(group: Ints, state: SetState) -> None:
     """Add the best candidate while one helps; gains seldom rise, so candidates far below the best are tried once."""
     gains = np.full(len(group), np.inf)
     while state.remaining[0] > 0:
-        best, best_gain = -1, SCORE_TOLERANCE
+        best, best_gain = NO_MEMBER, SCORE_TOLERANCE
         for k in range(len(group)):
             if state.inside[group[k]] or gains[k] < best_gain - _RETRY_MARGIN:
                 continue
-            gains[k] = gain(group[k], -1, state)
+            gains[k] = gain(group[k], NO_MEMBER, state)
             if gains[k] > best_gain:
                 best, best_gain = group[k], gains[k]
         if best < 0:
@@ -142,7 +142,7 @@ def _remove_worthless(fixed: int, removable: Flags, state: SetState) -> None:
     a = 0
     while a < state.size[0] and state.remaining[0] > 0:
         i = state.members[a]
-        if removable[i] and i != fixed and gain(i, -1, state) < -SCORE_TOLERANCE:
+        if removable[i] and i != fixed and gain(i, NO_MEMBER, state) < -SCORE_TOLERANCE:
             remove(a, state)
         else:
             a += 1
@@ -163,7 +163,7 @@ def _replace(in_group: Flags, state: SetState) -> None:
             is_open = is_open or (newest > state.settled[member] and _may_replace(i, member, in_group, state))
         if not is_open:
             continue
-        best, best_gain = member, gain(member, -1, state) + SCORE_TOLERANCE
+        best, best_gain = member, gain(member, NO_MEMBER, state) + SCORE_TOLERANCE
         withdraw(a, state)
         for k in range(neighbours.start[member], neighbours.start[member + 1]):
             i = neighbours.item[k]
