@@ -60,7 +60,7 @@ def hiders_of_cover(cover: Floats) -> RaggedArray:
     """Candidates who cover a part of each, from cover (view, candidate, candidate)."""
     rows = cover.reshape(-1, cover.shape[2])
     number, item = np.nonzero(rows)
-    return RaggedArray(np.searchsorted(number, np.arange(len(rows) + 1)), item, 1 - rows[number, item])
+    return RaggedArray(np.searchsorted(number, np.arange(len(rows) + 1)), item.copy(), 1 - rows[number, item])
 
 
 def random_frame(seed: int, candidates: int, tracks: int = 0) -> CraftedFrame:
