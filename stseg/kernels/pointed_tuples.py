@@ -24,8 +24,8 @@ _BY_ADDRESS = tuple(map(int, numba.__version__.split(".")[:2])) > (0, 61)
 def pointed(fields: Fields) -> Fields:
     """The same named tuple by its address, valid until the kernel that asks for it returns.
 
-    It must be an argument of that kernel: the caller holds the arrays of arguments for as long, while numba lets go of
-    what a kernel has made itself after its last use by name.
+    It is an argument of that kernel, since the caller holds the arrays of arguments for as long, or is used by name
+    after the last use of its address: numba lets go of what a kernel has made itself after its last use by name.
     """
     return fields
 

@@ -132,13 +132,7 @@ def fill_gains(
     Filled with what `fill_evidence` says of each, of members beside the others, are `view_evidence` float64 (view, k),
     boxes int64 (view, k) and tracks int64 (k,). Returns the score of the members.
     """
-    return _fill_gains(members, candidates, set_state(problem), gains, view_evidence, boxes, tracks)
-
-
-@kernel
-def _fill_gains(
-    members: Ints, candidates: Ints, whole: SetState, gains: Floats, view_evidence: Floats, boxes: Ints, tracks: Ints
-) -> float:
+    whole = set_state(problem)
     state = pointed(whole)
     for i in members:
         add(i, state.size[0], state)
@@ -153,4 +147,4 @@ def _fill_gains(
         if is_member:
             put(i, place, state)
     release(state)
-    return float(state.total[0])
+    return float(whole.total[0])

@@ -37,18 +37,11 @@ def find_best_set(
     moves, 0 for simple moves alone, and about `gain_limit` gains are computed. Returns the new size of the set, and the
     candidates of the largest group that was not searched to the end, 0 for none.
     """
-    return _improve(members, count, set_state(problem), enumeration_limit, swap_sweeps, gain_limit)
-
-
-@kernel
-def _improve(
-    members: Ints, count: int, whole: SetState, enumeration_limit: int, swap_sweeps: int, gain_limit: int
-) -> tuple[int, int]:
-    """The search, group by group; the state's set is that of one group after the other."""
+    whole = set_state(problem)
     state, candidates, unfinished = pointed(whole), len(whole.inside), 0
     group_of = np.empty(candidates, np.int64)
     state.inside[members[:count]] = True
-    for g in range(fill_groups(state, group_of)):
+    for g in range(fill_groups(state, group_of)):  # the state's set is that of one group after the other
         group = np.flatnonzero(group_of == g)
         start, state.size[0], state.remaining[0] = group[state.inside[group]], 0, gain_limit
         for i in start:
@@ -62,7 +55,7 @@ def _improve(
             if state.remaining[0] <= 0:
                 unfinished = max(unfinished, len(group))
         release(state)
-    best = np.flatnonzero(state.inside)
+    best = np.flatnonzero(whole.inside)
     for a in range(len(best)):
         members[a] = best[a]
     return len(best), unfinished
