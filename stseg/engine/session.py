@@ -4,9 +4,9 @@ All that is learned from the frames belongs to the session: the foreground model
 body sizes, the error rates of the views, and the tracker's tracks. Sessions of one pipeline know nothing of each other.
 
 Detection needs the tracks of the frame before, so it goes frame by frame. The foreground of the next frames needs
-nothing of it, and nothing waits for a frame's volume before its window is cut: `run_session` gives each a thread of its
-own from the frame on at which it has more than one core: threads cost a seventh more processor time. Every stage still
-takes the frames in their order, so the results are the same, bit for bit.
+nothing of it; it waits neither for a frame's volume nor for the cut of a window: `run_session` gives each a thread of
+its own from the frame on at which it has more than one core: threads cost a seventh more processor time. Every stage
+still takes the frames in their order, so the results are the same, bit for bit.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
 from stseg.records.tables import EVENT, SHIFT
 from stseg.trackers import Commit, FrameObservations, FusedFrame
+from stseg.trackers.cut import CutTracker
 from stseg.view_health.blind_views import ExcludedViews, FrozenViews
 from stseg.view_health.image_shifts import image_shifts, shift_is_due
 
@@ -57,11 +59,6 @@ class Session:
         Number of the first frame.
     factors
         Reduction factor of each camera's images, whose shifts are measured then; None to measure none.
-
-    Attributes
-    ----------
-    fusion
-        One thread that fuses evidence while detection goes on; None to fuse in the caller's.
     """
 
     def __init__(
@@ -79,8 +76,14 @@ class Session:
         self._error_rates = pipeline.occupancy.new_error_rates()
         self._records: dict[int, FrameRecord] = {}
         self._factors, self._shifts = factors, dict[int, Rows]()
-        self.fusion: Executor | None = None
+        self._fusion: Executor | None = None
         self._open: deque[Future[FusedEvidence]] = deque()
+
+    def share(self, fusion: Executor, cuts: Executor) -> None:
+        """From now on fuse evidence, and cut windows, in a thread each while detection goes on."""
+        self._fusion = fusion
+        if isinstance(self._tracker, CutTracker):
+            self._tracker.submit = partial(cuts.submit, self._timed)
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
         """The foreground of all views; to be called once for each frame set, in the order of time."""
@@ -138,14 +141,18 @@ class Session:
     def _submit(
         self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise
     ) -> Future[FusedEvidence]:
-        if self.fusion is None:
+        if self._fusion is None:
             done = Future[FusedEvidence]()
             done.set_result(self._fuse(frame, evidence, explanation, noise))
             return done
         if len(self._open) == _BEHIND:
             self._open.popleft().result()
-        self._open.append(self.fusion.submit(self._fuse, frame, evidence, explanation, noise))
+        self._open.append(self._fusion.submit(self._fuse, frame, evidence, explanation, noise))
         return self._open[-1]
+
+    def _timed(self, solution: Callable[[], Commit]) -> Commit:
+        with self.watch.time("tracking"):
+            return solution()
 
     def _fuse(
         self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise
@@ -216,7 +223,8 @@ def _prepared(
         if (prepared := _next_prepared(session, coming)) is None:
             return
         yield prepared
-    ahead, session.fusion = (threads.enter_context(ThreadPoolExecutor(1, name)) for name in ("foreground", "fusion"))
+    ahead, *shared = (threads.enter_context(ThreadPoolExecutor(1, name)) for name in ("foreground", "fusion", "cuts"))
+    session.share(*shared)
     waiting = deque(ahead.submit(_next_prepared, session, coming) for _ in range(_AHEAD))
     try:
         while (prepared := waiting.popleft().result()) is not None:

@@ -5,6 +5,10 @@ See docs/how-it-works.md, Energy and Tracks.
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
 from itertools import pairwise
 from typing import ClassVar
 
@@ -36,7 +40,13 @@ from stseg.tracking.windows.windows import ENDLESS, LONGEST, Window, windows
 
 
 class CutTracker:
-    """Tracks by the minimum cut of overlapping windows; see `TrackingMethod`."""
+    """Tracks by the minimum cut of overlapping windows; see `TrackingMethod`.
+
+    Attributes
+    ----------
+    submit
+        Has windows solved one after the other, perhaps in another thread while frames are added.
+    """
 
     final: ClassVar[bool] = False
 
@@ -53,26 +63,27 @@ class CutTracker:
         self.first = self.committed = first
         self.coming = windows(rig.frame_rate, config.tracking, first, ENDLESS)
         self.window = next(self.coming)
+        self.submit: Callable[[Callable[[], Commit]], Future[Commit]] = _done
+        self._solving = deque[Future[Commit]]()
 
     def predict(self, frame: int) -> PredictedTracks | None:
         """Predictions of all tracks for a frame; None for the first."""
         return self.filter.predict(frame)
 
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
-        """Add a frame; commit the window before it if that is complete.
+        """Add a frame; commit windows that are solved, and solve the window before it if that is complete.
 
         A window waits for the time after its last frame in which a hidden person may appear again.
         """
         del observed
-        commits = []
         if fused.frame >= self.window.solve_stop + self.context:
-            commits.append(self._solve(self.window))
+            self._solve_later(self.window)
             self.window = next(self.coming)
             needed = self.window.solve_first - self.context
             self.open_frames = [tracked for tracked in self.open_frames if tracked.fused.frame >= needed]
         tracks = self.filter.update(fused.frame, fused.people, fused.ghosts)
         self.open_frames.append(TrackedFrame(fused, tracks))
-        return commits
+        return self._solved(1)
 
     def finish(self) -> list[Commit]:
         """Solve the open windows; the run ends here."""
@@ -80,12 +91,27 @@ class CutTracker:
             return []
         stop = self.open_frames[-1].fused.frame + 1
         remaining = windows(self.rig.frame_rate, self.config.tracking, self.first, stop)
-        return [self._solve(window) for window in remaining if window.commit_stop > self.committed]
+        for window in remaining:
+            if window.commit_stop > self.committed:
+                self._solve_later(window)
+        return self._solved(0)
 
-    def _solve(self, window: Window) -> Commit:
-        first, stop = window.solve_first, window.solve_stop
-        around = [one for one in self.open_frames if first - self.context <= one.fused.frame < stop + self.context]
-        frames = self.existence.revised(around, first, stop)
+    def _solve_later(self, window: Window) -> None:
+        """Have a window solved by the frames that are open now."""
+        first, stop = window.solve_first - self.context, window.solve_stop + self.context
+        around = [one for one in self.open_frames if first <= one.fused.frame < stop]
+        self.committed = window.commit_stop
+        self._solving.append(self.submit(partial(self._solve, window, around)))
+
+    def _solved(self, most: int) -> list[Commit]:
+        """The next windows that are solved; waits until at most so many are not."""
+        commits = []
+        while self._solving and (len(self._solving) > most or self._solving[0].done()):
+            commits.append(self._solving.popleft().result())
+        return commits
+
+    def _solve(self, window: Window, around: list[TrackedFrame]) -> Commit:
+        frames = self.existence.revised(around, window.solve_first, window.solve_stop)
         patches, log_odds, energy = self._cut_out(frames)
         cut = self.solver.grid(energy)
         label = self._divide(window, frames, patches, energy, cut.occupied).label
@@ -98,7 +124,6 @@ class CutTracker:
         decision = self.association.decide(window, blobs, tracklets)
         frames_of = window.index, window.solve_first, window.solve_stop, window.commit_first, window.commit_stop
         row = np.array([(*frames_of, energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
-        self.committed = window.commit_stop
         return self._commit(window, frames, patches, label, blobs, decision, row)
 
     def _cut_out(self, frames: list[TrackedFrame]) -> tuple[GroundPatches, Singles, GridEnergy]:
@@ -189,3 +214,10 @@ class CutTracker:
             identity[named], ground, covariance, tall[detected], wide[detected], people.evidence[detected]
         )
         return trajectory_rows(fused.frame, tracks, blobs.extent[named], views_at(self.rig, ground))
+
+
+def _done(solution: Callable[[], Commit]) -> Future[Commit]:
+    """A window that is solved at once."""
+    done = Future[Commit]()
+    done.set_result(solution())
+    return done
