@@ -160,15 +160,19 @@ class _ExpectedPeople:
 
 def found_pixels(first: Ints, spans: Spans, foreground: Flags, shifts: Ints) -> tuple[Ints, Ints]:
     """Foreground pixels inside outlines (body,) shifted by (n, 2) along v and u, int64 (n, body); all (body,)."""
-    left_of, found = np.pad(foreground, ((0, 0), (1, 0))).cumsum(1), np.empty((len(shifts), len(first)), np.int64)
-    _fill_found(first, spans, left_of, shifts, found)
+    found = np.empty((len(shifts), len(first)), np.int64)
+    _fill_found(first, spans, foreground, shifts, found)
     return found, (spans[..., 1] - spans[..., 0]).clip(0).sum(1, dtype=np.int64)
 
 
 @kernel
-def _fill_found(first: Ints, spans: Spans, left_of: Ints, shifts: Ints, found: Ints) -> None:
-    """Fill found (n, body), see `found_pixels`, by sums of pixels to the left of each column, (v, u + 1)."""
-    columns = left_of.shape[1] - 1
+def _fill_found(first: Ints, spans: Spans, foreground: Flags, shifts: Ints, found: Ints) -> None:
+    """Fill found (n, body), see `found_pixels`, by sums of pixels to the left of each column."""
+    rows, columns = foreground.shape
+    left_of = np.zeros((rows, columns + 1), np.int32)
+    for v in range(rows):
+        for u in range(columns):
+            left_of[v, u + 1] = left_of[v, u] + foreground[v, u]
     for n in range(len(shifts)):
         for j in range(len(first)):
             total, top = 0, first[j] + shifts[n, 0]

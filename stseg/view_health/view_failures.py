@@ -31,9 +31,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Flags
+from stseg.arrays import Flags, Ints
 from stseg.bodies.views import BoxView, PixelView, ViewObservation
 from stseg.config import BodyConfig, ErrorRateConfig
+from stseg.kernels.accelerate import kernel
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation
 from stseg.records.predicted_tracks import PredictedTracks
@@ -226,11 +227,18 @@ def informedness(assignment: NDArray[np.int16], certain: Flags, foreground: Flag
     """
     if not certain.any():
         return 0, 0.0
-    person = assignment + 1  # 0 for none
-    pixels, occupied = (
-        np.bincount(counted.ravel(), minlength=len(certain) + 1) for counted in (person, person[foreground])
-    )
+    pixels, occupied = np.zeros((2, len(certain) + 1), np.int64)
+    _count_pixels(assignment, foreground, pixels, occupied)
     visible = 1 + np.flatnonzero(certain & (pixels[1:] > 0))
     if not len(visible):
         return 0, 0.0
     return len(visible), float((occupied[visible] / pixels[visible]).mean() - occupied[0] / max(int(pixels[0]), 1))
+
+
+@kernel
+def _count_pixels(assignment: NDArray[np.int16], foreground: Flags, pixels: Ints, occupied: Ints) -> None:
+    """Count pixels and those of the foreground, each (1 + person,), of nobody first."""
+    for v in range(assignment.shape[0]):
+        for u in range(assignment.shape[1]):
+            pixels[assignment[v, u] + 1] += 1
+            occupied[assignment[v, u] + 1] += foreground[v, u]
