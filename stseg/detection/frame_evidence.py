@@ -45,12 +45,12 @@ class FrameEvidence:
         return stacked_rasters(self.views, [None if o is None else o.raster for o in self.observations])
 
     @cached_property
-    def box_lattices(self) -> list[BoxLattice | None]:
-        """The lattice of each view that delivers boxes with those of the frame; None where there are none."""
-        return [
-            BoxLattice(view, observation) if isinstance(view, BoxView) and observation is not None else None
-            for view, observation in zip(self.views, self.observations, strict=True)
-        ]
+    def box_lattice(self) -> BoxLattice:
+        """The birth lattice with the frame's boxes."""
+        pairs = enumerate(zip(self.views, self.observations, strict=True))
+        seen = {k: (view, o) for k, (view, o) in pairs if isinstance(view, BoxView) and o is not None}
+        prior = self.prior.log_height(np.asarray(self.prior.body.heights))
+        return BoxLattice(seen, np.repeat(prior, self.views[0].bodies.shape[1]))
 
     @cached_property
     def patch_scores(self) -> dict[bytes, Floats]:

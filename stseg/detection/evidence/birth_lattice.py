@@ -34,10 +34,7 @@ def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candida
     evidence = estimate.evidence
     prior, (rows, columns) = evidence.prior, lattice_ground.shape[:2]
     heights = np.asarray(prior.body.heights)
-    score = np.repeat(prior.log_height(heights)[:, None], rows * columns, 1)
-    for boxes, assigned in zip(evidence.box_lattices, estimate.box_assignment, strict=True):
-        if boxes is not None:
-            score += boxes.score(assigned < 0)
+    score = evidence.box_lattice.score(estimate.box_assignment).reshape(len(heights), rows * columns)
     if len(evidence.rasters):
         pixels = UnexplainedPixels.of(evidence.rasters, estimate.owners, evidence.lattice, evidence.extremes)
         probes = _probes(heights)

@@ -1,13 +1,16 @@
-"""Score of the lattice's pillars by the boxes of one view that are assigned to no member.
+"""Score of the lattice's pillars by the boxes that are assigned to no member.
 
-A frame has several rounds, each with other boxes free; the pillars that fit a box are found once.
+A frame has several rounds, each with other boxes free; the pillars that fit a box are found once. Most pillars fit none
+of the free ones: their score is that of the frame without boxes, and they cost nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Labels
+from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.bodies.pillar_index import fill_fits
 from stseg.bodies.views import BoxView, ViewObservation
 from stseg.kernels.accelerate import kernel
@@ -17,45 +20,59 @@ _EXPECTED_MISSING_COST = 0.3
 
 
 class BoxLattice:
-    """The pillars of a view's lattice and the boxes of a frame."""
+    """The pillars of the lattice and the boxes of a frame, of the views that have some; pillars (height * cell,).
 
-    def __init__(self, view: BoxView, observation: ViewObservation) -> None:
-        self._view, self._observation = view, observation
-        self._pillars = view.bodies.reshape(-1, 4)
-        self._fits: dict[int, tuple[Labels, Floats]] = {}
+    `prior` float64 (pillar,) is the score of each pillar without any view, nats. Views are numbered as the rig has
+    them.
+    """
 
-    def score(self, free: Flags) -> Floats:
-        """Score of each pillar by the free boxes, bool (box,): nats, float64 (height, cell)."""
-        best = np.full(self._view.bodies.shape[:2], -np.inf)
-        flat, found = best.reshape(-1), self._view.found.reshape(-1)
-        for box in np.flatnonzero(free).tolist():
-            if box not in self._fits:
-                self._fits[box] = self._fits_of(box)
-            _raise_to(*self._fits[box], flat)
-        _take_for_score(flat, found, self._view.config.box_log_ratio)
-        return best
+    def __init__(self, views: dict[int, tuple[BoxView, ViewObservation]], prior: Floats) -> None:
+        self._views, self._prior, self._without = views, prior, prior.copy()
+        self._fits = {view: dict[int, tuple[Labels, Floats]]() for view in views}
+        for view, _ in views.values():
+            _add_scores(np.arange(len(prior)), view.best_fit, view.found, view.config.box_log_ratio, self._without)
 
-    def _fits_of(self, box: int) -> tuple[Labels, Floats]:
+    def score(self, assigned: Sequence[Ints]) -> Floats:
+        """Score of each pillar by the boxes that are free, -1 in the assigned (box,) of their view: nats."""
+        score, is_open = self._without.copy(), np.zeros(len(self._prior), bool)
+        for number, (view, _) in self._views.items():
+            for box in np.flatnonzero(assigned[number] < 0).tolist():
+                if box not in self._fits[number]:
+                    self._fits[number][box] = self._fits_of(number, box)
+                _raise_to(*self._fits[number][box], view.best_fit, is_open)
+        pillars = np.flatnonzero(is_open)
+        score[pillars] = self._prior[pillars]
+        for view, _ in self._views.values():
+            _add_scores(pillars, view.best_fit, view.found, view.config.box_log_ratio, score)
+        return score
+
+    def _fits_of(self, number: int, box: int) -> tuple[Labels, Floats]:
         """The pillars that gain by a box, int32 (k,), and its log-likelihood given each, nats, float64 (k,)."""
-        index, observation = self._view.index, self._observation
+        view, observation = self._views[number]
+        index, least = view.index, -view.config.box_log_ratio - _EXPECTED_MISSING_COST
         pillar, fit = np.empty(len(index.order), np.int32), np.empty(len(index.order))
-        width, height = map(float, self._view.camera.size)
-        number = fill_fits(
-            index, self._pillars, observation.edges[box], observation.tolerance[box], float(observation.belief[box]),
-            width, height, -self._view.config.box_log_ratio - _EXPECTED_MISSING_COST, pillar, fit,
+        width, height = map(float, view.camera.size)
+        found = fill_fits(
+            index, view.bodies.reshape(-1, 4), observation.edges[box], observation.tolerance[box],
+            float(observation.belief[box]), width, height, least, pillar, fit,
         )  # fmt: skip
-        return pillar[:number].copy(), fit[:number].copy()
+        return pillar[:found].copy(), fit[:found].copy()
 
 
 @kernel
-def _raise_to(pillar: Labels, fit: Floats, best: Floats) -> None:
-    """Raise best of some pillars to the fit of each."""
+def _raise_to(pillar: Labels, fit: Floats, best: Floats, is_open: Flags) -> None:
+    """Raise best of some pillars to the fit of each, and mark them."""
     for k in range(len(pillar)):
         best[pillar[k]] = max(best[pillar[k]], fit[k])
+        is_open[pillar[k]] = True
 
 
 @kernel
-def _take_for_score(best: Floats, found: Floats, log_ratio: float) -> None:
-    """Make scores of log-likelihoods of the best box, best (pillar,), where the view may find (pillar,) the body."""
-    for i in range(len(best)):
-        best[i] = max(log_ratio + best[i], -_EXPECTED_MISSING_COST * found[i]) if found[i] > 0 else 0.0
+def _add_scores(pillars: Ints, best: Floats, found: Floats, log_ratio: float, score: Floats) -> None:
+    """Add a view's scores of some pillars by the best fits (pillar,) of boxes, which are -inf again afterwards.
+
+    `found` float64 (pillar,) is the share of the detection rate with which the view finds each body.
+    """
+    for i in pillars:
+        score[i] += max(log_ratio + best[i], -_EXPECTED_MISSING_COST * found[i]) if found[i] > 0 else 0.0
+        best[i] = -np.inf
