@@ -35,8 +35,8 @@ class BodyTable(NamedTuple):
     ----------
     origin, step
         Ground position of the first lattice point and the lattice's spacing, metres.
-    pixel : float32 (level, y, x, 2)
-        Pixel of each lattice point at each level; nan where the camera does not see it.
+    pixel : float32 (y, x, level, 2)
+        Pixel of each lattice point at each level, which a body needs together; nan where the camera does not see it.
     size
         Width and height of the image, pixels.
     breadth
@@ -55,10 +55,10 @@ class BodyTable(NamedTuple):
         x = np.arange(grid.x[0] - margin, grid.x[1] + margin + step, step)
         y = np.arange(grid.y[0] - margin, grid.y[1] + margin + step, step)
         ground = np.stack(np.meshgrid(x, y), -1)
-        pixel = np.full((len(LEVELS), len(y), len(x), 2), np.nan, np.float32)
+        pixel = np.full((len(y), len(x), len(LEVELS), 2), np.nan, np.float32)
         for k, level in enumerate(LEVELS):
             place, ahead = camera.project(ground, float(level))
-            pixel[k] = np.where(ahead[..., None], place, np.nan)
+            pixel[:, :, k] = np.where(ahead[..., None], place, np.nan)
         return cls((float(x[0]), float(y[0])), step, pixel, camera.size, breadth)
 
     def boxes(self, ground: Floats, heights: Floats) -> Floats:
@@ -92,21 +92,23 @@ def fill_discs(
 ) -> None:
     """Fill filled (disc, 6) with each disc's centre u, v and its Jacobian times radius, pixels."""
     pixel, step = table.pixel, table.step
-    levels, rows, columns, _ = pixel.shape
+    rows, columns, levels, _ = pixel.shape
     column = min(max(int(np.floor(lattice_x)), 0), columns - 2)
     row = min(max(int(np.floor(lattice_y)), 0), rows - 2)
     a, b = lattice_x - column, lattice_y - row
-    for k in range(len(profile)):
+    here, right, below = np.uint64(column), np.uint64(column + 1), np.uint64(row + 1)
+    near, next_near = pixel[np.uint64(row), here], pixel[np.uint64(row), right]
+    far, next_far = pixel[below, here], pixel[below, right]
+    for k in range(np.uint64(len(profile))):
         z = profile[k, 0] * height / _LEVEL_STEP
         level = min(max(int(np.floor(z)), 0), levels - 2)
-        c = z - level
-        for axis in range(2):
-            p00 = pixel[level, row, column, axis] * (1 - c) + pixel[level + 1, row, column, axis] * c
-            p01 = pixel[level, row, column + 1, axis] * (1 - c) + pixel[level + 1, row, column + 1, axis] * c
-            p10 = pixel[level, row + 1, column, axis] * (1 - c) + pixel[level + 1, row + 1, column, axis] * c
-            p11 = pixel[level, row + 1, column + 1, axis] * (1 - c) + pixel[level + 1, row + 1, column + 1, axis] * c
+        c, radius, low, high = z - level, profile[k, 1] / step, np.uint64(level), np.uint64(level + 1)
+        for axis in range(np.uint64(2)):
+            p00 = near[low, axis] * (1 - c) + near[high, axis] * c
+            p01 = next_near[low, axis] * (1 - c) + next_near[high, axis] * c
+            p10 = far[low, axis] * (1 - c) + far[high, axis] * c
+            p11 = next_far[low, axis] * (1 - c) + next_far[high, axis] * c
             filled[k, axis] = (p00 * (1 - a) + p01 * a) * (1 - b) + (p10 * (1 - a) + p11 * a) * b
-            radius = profile[k, 1] / step
             filled[k, 2 + 2 * axis] = ((p01 - p00) * (1 - b) + (p11 - p10) * b) * radius
             filled[k, 3 + 2 * axis] = ((p10 - p00) * (1 - a) + (p11 - p01) * a) * radius
 
