@@ -35,8 +35,8 @@ def plan(
 
     Example: stseg plan rig.toml --workers 4
 
-    It counts the recording, as the run will, and tracks frames at four places of it. The other options are those of
-    stseg run. Workers are taken to have a core each.
+    It counts the recording, as the run will, and tracks frames at three places of it. The other options are those of
+    stseg run. Workers share the cores of this machine; each has one at least.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def _text(estimate: Forecast, recording: Recording) -> str:
     return "\n".join(
         [
             f"recording   {estimate.frames} frames, {_span(hours * 3600)}, in {estimate.segments} segments",
-            f"run         {_span(estimate.seconds)} with {estimate.workers} workers, a core each",
+            f"run         {_span(estimate.seconds)} with {estimate.workers} workers",
             f"work        {parts}",
             f"run file    {size:.0f} MiB, {size / hours:.0f} MiB an hour; temporary files need the same space again",
         ]

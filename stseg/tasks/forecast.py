@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import perf_counter, process_time, thread_time
 
+import numpy as np
+
+from stseg.arrays import Floats
 from stseg.config import Config
 from stseg.config.keys import require_effect
 from stseg.engine.memory import require_memory
@@ -20,17 +24,18 @@ from stseg.engine.recordings import config_of, recording_of
 from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workers.workforce import Workforce
+from stseg.io.machine import free_cores
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.layout import VolumeKind
 from stseg.tracking.windows.windows import window_length
 
-_PLACES = 4
+_PLACES = 3
 """Number of tried parts, spread over the recording: where few people are, and where many are."""
 _FRAMES = 12
-"""Frames of each, so that all take no longer than a few seconds."""
+"""Frames of each, so that all take no longer than a second or two."""
 _READY = 4
-"""First frames of a part that do not count: kernels are loaded, and frames without tracks cost more than others."""
+"""First frames of a part that do not count: frames without tracks cost more than others."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,7 @@ class Forecast:
     frames, segments, workers
         Of the run, of which each segment is made by one worker.
     counting, learning, tracking, joining
-        Seconds of work of one core: counting all streams, learning backgrounds, making all segments, writing the run
+        Seconds of work of one worker: counting all streams, learning backgrounds, making all segments, writing the run
         file.
     file_bytes
         Size of the run file; the folder of segments beside it takes as much until it stands.
@@ -83,7 +88,8 @@ def plan(
     rig, frames, config, tracker, volume, progress
         As of `stseg.track`.
     workers
-        Processes that will share the work, a core each; None for one per core as far as memory allows.
+        Processes that will share the work, and the cores of this machine, of which each has one at least; None for one
+        per core as far as memory allows.
 
     Raises
     ------
@@ -108,27 +114,29 @@ def plan(
 def forecast(job: Job, counting: float, workers: int) -> Forecast:
     """Forecast of a job, from parts of it that are tracked now; `counting` is in seconds.
 
-    Processor time is measured, of all threads together: workers have a core each.
+    Processor time is measured: a worker with several cores needs a share of that of all threads, but no less than that
+    of the thread which takes one frame after the other.
     """
-    work, cuts, parts = SegmentWorker(job), job.segments(), list(_parts(job))
-    work.ends = [part.stop for part in parts]
+    cores, cuts, parts = -(-free_cores() // workers), job.segments(), list(_parts(job))
+    work = SegmentWorker(job, lambda: cores)
+    work.ends = sorted({min(parts[0].first + 1, job.stop), *(part.stop for part in parts)})
     tracking, learning, made = list[float](), list[float](), list[FinishedSegment]()
     with TemporaryDirectory() as name:
         folder = Path(name)
-        ready = replace(parts[0], stop=min(parts[0].first + _READY, parts[0].stop))
-        work.make(ready, folder / "ready.h5", lambda _: None)
+        ready = replace(parts[0], stop=work.ends[0])  # its kernels are loaded, and its file is joined, before it counts
+        path = work.make(ready, folder / "ready.h5", lambda _: None)
+        assemble(job, [FinishedSegment(ready, path)], folder / "run.h5")
         for part in parts:
-            clock = [process_time()]
+            begin = process_time()
             work.foregrounds(part)
-            learning.append(process_time() - clock[0])
-            clock = [process_time()]
+            learning.append(process_time() - begin)
+            clock = [(process_time(), thread_time())]
             path = work.make(part, folder / f"{part.index}.h5", partial(_note_time, clock))
             made.append(FinishedSegment(part, path))
-            skipped = min(_READY, len(clock) - 2)
-            tracking.append((process_time() - clock[skipped]) / (len(clock) - 1 - skipped))
-        begin = process_time()
-        assemble(job, made, folder / "run.h5")
-        joining, size = process_time() - begin, (folder / "run.h5").stat().st_size
+            clock.append((process_time(), thread_time()))
+            tracking.append(_time_of_frame(np.array(clock), cores))
+        joining = [_time_to_join(job, made[:number], folder / "run.h5") for number in (1, len(made))]
+        size = (folder / "run.h5").stat().st_size
     rate, tried = job.recording.rig.frame_rate, sum(part.stop - part.first for part in parts)
     frames = sum(segment.stop - segment.first for segment in cuts)
     excess = window_length(rate, job.config.tracking)[0]  # a segment is processed until its last window is solved
@@ -136,18 +144,37 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
     learned = -(-frames // round(job.config.segments.background_period * rate))
     return Forecast(
         frames, len(cuts), workers, counting, max(learning) * learned, sum(tracking) / len(parts) * processed,
-        joining / tried * frames, round(size / tried * frames),
+        joining[0] + max(joining[1] - joining[0], 0.0) / tried * frames, round(size / tried * frames),
     )  # fmt: skip
 
 
-def _note_time(clock: list[float], _: int) -> None:
-    """Append the processor time after a further frame."""
-    clock.append(process_time())
+def _time_of_frame(clock: Floats, cores: int) -> float:
+    """Time of a worker with so many cores for a frame, seconds.
+
+    `clock` float64 (frame + 2, 2) is processor time, of all threads and of the one that takes a frame after the other:
+    before the frames, after each, and when all windows are cut, which belongs to all frames alike.
+    """
+    frames = len(clock) - 2
+    skipped = min(_READY, frames - 1)
+    whole, main = (clock[-2] - clock[skipped]) / (frames - skipped)
+    whole += (clock[-1, 0] - clock[-2, 0]) / frames
+    return float(max(whole / cores, main))
+
+
+def _time_to_join(job: Job, made: Sequence[FinishedSegment], output: Path) -> float:
+    begin = process_time()
+    assemble(job, made, output)
+    return process_time() - begin
+
+
+def _note_time(clock: list[tuple[float, float]], _: int) -> None:
+    """Append the processor time of all threads, and of this one, after a further frame."""
+    clock.append((process_time(), thread_time()))
 
 
 def _parts(job: Job) -> list[Segment]:
     """Short parts spread over the run, without a warm-up."""
     total = job.stop - job.first
     length = min(_FRAMES, max(1, total // _PLACES))
-    begins = [job.first + (total - length) * place // (_PLACES - 1) for place in range(_PLACES)]
+    begins = [job.first + (total - length) * (2 * place + 1) // (2 * _PLACES) for place in range(_PLACES)]
     return [Segment(k, begin, begin, begin + length) for k, begin in enumerate(begins) if k == 0 or total > _PLACES]
