@@ -67,15 +67,9 @@ def paint_outlines(order: Ints, first: Ints, spans: Spans, assigned: Shorts) -> 
 
 
 def sums_inside(
-    table: BodyTable,
-    ground: Floats,
-    heights: Floats,
-    widths: Floats,
-    step: int,
-    values: Singles,
-    owner: Shorts,
+    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, step: int, values: Singles, owner: Shorts,
     number: Ints,
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Sums of a map inside outlines of pillars, several for each person: quicker than outlines that are kept.
 
     Parameters
@@ -105,17 +99,9 @@ def sums_inside(
 
 @kernel
 def _fill_outlines(
-    table: BodyTable,
-    ground: Floats,
-    heights: Floats,
-    widths: Floats,
-    raster_step: float,
-    columns: int,
-    first: Ints,
-    count: Ints,
-    spans: Spans,
-    area: Floats,
-) -> None:
+    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, raster_step: float, columns: int, first: Ints,
+    count: Ints, spans: Spans, area: Floats,
+) -> None:  # fmt: skip
     rows, (discs, drawn) = spans.shape[1], np.empty((2, len(SILHOUETTE), 6))
     low, high = np.empty(rows), np.empty(rows)
     for i in range(len(ground)):
@@ -129,17 +115,9 @@ def _fill_outlines(
 
 @kernel
 def _fill_sums(
-    table: BodyTable,
-    ground: Floats,
-    heights: Floats,
-    widths: Floats,
-    raster_step: float,
-    values: Singles,
-    owner: Shorts,
-    number: Ints,
-    sums: Floats,
-    area: Floats,
-) -> None:
+    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, raster_step: float, values: Singles,
+    owner: Shorts, number: Ints, sums: Floats, area: Floats,
+) -> None:  # fmt: skip
     people, pillars = heights.shape
     rows, columns = values.shape
     discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((pillars, len(SILHOUETTE), 6))

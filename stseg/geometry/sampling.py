@@ -87,16 +87,9 @@ def _footprints(camera: Camera, rig: Rig, kind: SamplingKind) -> Footprints:
 
 @kernel
 def _fill_boxes(
-    ground: Floats,
-    height: float,
-    projection: Floats,
-    lens: LensTerms,
-    centre: Floats,
-    visible: Flags,
-    shift: float,
-    size: tuple[int, int],
-    boxes: Footprints,
-) -> None:
+    ground: Floats, height: float, projection: Floats, lens: LensTerms, centre: Floats, visible: Flags, shift: float,
+    size: tuple[int, int], boxes: Footprints,
+) -> None:  # fmt: skip
     """Fill boxes (y, x, 4) of whole pixels, clipped to the image, about the centres (y, x, 2) of cells that are seen.
 
     Their sides are the derivative of the pixel, by a shift in metres to either side along x and y, times the cell's

@@ -87,17 +87,9 @@ def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> L
 
 @kernel
 def _fill_log_weights(
-    frame: Ints,
-    ground: Floats,
-    height: Floats,
-    expected: Flags,
-    predicted_ground: Floats,
-    precision: Floats,
-    log_volume: Floats,
-    head_height: Floats,
-    height_spread: float,
-    weight: Floats,
-) -> None:
+    frame: Ints, ground: Floats, height: Floats, expected: Flags, predicted_ground: Floats, precision: Floats,
+    log_volume: Floats, head_height: Floats, height_spread: float, weight: Floats,
+) -> None:  # fmt: skip
     """Add the tracks' log-weights to weight (n, k + 1), nats; -inf outside the gate."""
     for i in range(len(frame)):
         t = frame[i]
