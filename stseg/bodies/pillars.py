@@ -97,17 +97,17 @@ def fill_discs(
     row = min(max(int(np.floor(lattice_y)), 0), rows - 2)
     a, b = lattice_x - column, lattice_y - row
     here, right, below = np.uint64(column), np.uint64(column + 1), np.uint64(row + 1)
-    near, next_near = pixel[np.uint64(row), here], pixel[np.uint64(row), right]
-    far, next_far = pixel[below, here], pixel[below, right]
+    first, second = pixel[np.uint64(row), here], pixel[np.uint64(row), right]
+    third, fourth = pixel[below, here], pixel[below, right]
     for k in range(np.uint64(len(profile))):
         z = profile[k, 0] * height / _LEVEL_STEP
         level = min(max(int(np.floor(z)), 0), levels - 2)
         c, radius, low, high = z - level, profile[k, 1] / step, np.uint64(level), np.uint64(level + 1)
         for axis in range(np.uint64(2)):
-            p00 = near[low, axis] * (1 - c) + near[high, axis] * c
-            p01 = next_near[low, axis] * (1 - c) + next_near[high, axis] * c
-            p10 = far[low, axis] * (1 - c) + far[high, axis] * c
-            p11 = next_far[low, axis] * (1 - c) + next_far[high, axis] * c
+            p00 = first[low, axis] * (1 - c) + first[high, axis] * c
+            p01 = second[low, axis] * (1 - c) + second[high, axis] * c
+            p10 = third[low, axis] * (1 - c) + third[high, axis] * c
+            p11 = fourth[low, axis] * (1 - c) + fourth[high, axis] * c
             filled[k, axis] = (p00 * (1 - a) + p01 * a) * (1 - b) + (p10 * (1 - a) + p11 * a) * b
             filled[k, 2 + 2 * axis] = ((p01 - p00) * (1 - b) + (p11 - p10) * b) * radius
             filled[k, 3 + 2 * axis] = ((p10 - p00) * (1 - a) + (p11 - p01) * a) * radius

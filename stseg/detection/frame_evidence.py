@@ -48,9 +48,9 @@ class FrameEvidence:
     def box_lattice(self) -> BoxLattice:
         """The birth lattice with the frame's boxes."""
         pairs = enumerate(zip(self.views, self.observations, strict=True))
-        seen = {k: (view, o) for k, (view, o) in pairs if isinstance(view, BoxView) and o is not None}
+        views = {k: (view, o) for k, (view, o) in pairs if isinstance(view, BoxView) and o is not None}
         prior = self.prior.log_height(np.asarray(self.prior.body.heights))
-        return BoxLattice(seen, np.repeat(prior, self.views[0].bodies.shape[1]))
+        return BoxLattice(views, np.repeat(prior, self.views[0].bodies.shape[1]))
 
     @cached_property
     def patch_scores(self) -> dict[bytes, Floats]:

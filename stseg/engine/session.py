@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from functools import partial
 
 import numpy as np
 
@@ -83,7 +82,7 @@ class Session:
         """From now on fuse evidence, and cut windows, in a thread each while detection goes on."""
         self._fusion = fusion
         if isinstance(self._tracker, CutTracker):
-            self._tracker.submit = partial(cuts.submit, self._timed)
+            self._tracker.submit = lambda solution: cuts.submit(self._timed, solution)
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
         """The foreground of all views; to be called once for each frame set, in the order of time."""
