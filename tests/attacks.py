@@ -5,24 +5,7 @@ from pathlib import Path
 import numpy as np
 from films import write_at_rate
 
-RIG = """
-format = 1
-[scene]
-name = "yard"
-frame_rate = 10.0
-x = [-2.0, 2.0]
-y = [-2.0, 2.0]
-[grid]
-cell = 0.2
-top = 1.8
-planes = 4
-[[camera]]
-name = "cam1"
-size = [64, 48]
-ground = [[60.0, 32.0, 192.0], [0.0, 24.0, 324.0], [0.0, 1.0, 6.0]]
-vertical = [0.0, -60.0, 0.0]
-source = { kind = "boxes", path = "boxes.csv" }
-"""
+RIG = (Path(__file__).parent / "attacks" / "yard.toml").read_text()
 
 
 def write_rig(folder: Path, old: str = "", new: str = "") -> Path:

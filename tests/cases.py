@@ -17,6 +17,11 @@ def tables(path: Path) -> dict[str, Any]:
     return tomllib.loads(path.read_text("utf-8"))
 
 
+def frozen(value: Any) -> Any:
+    """Lists of a table as tuples."""
+    return tuple(map(frozen, value)) if isinstance(value, list) else value
+
+
 def cases(*more: object) -> Callable[[Test], Test]:
     """A test of each row of the table of its name, whose first row names the columns, and of rows that code makes."""
 

@@ -119,8 +119,7 @@ class Driver:
         self, output: Path, fault: str = "none", at: int = -1, after: float | None = None, words: Sequence[str] = ()
     ) -> Trial:
         """A run, or another command, whose call number `at` fails, or that is killed after some seconds."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
+        assert self._process.stdin is not None and self._process.stdout is not None
         self._log.unlink(missing_ok=True)
         Path(f"{self._log}.err").touch()
         arguments = [*(words or ["run", str(self._rig), *OPTIONS, *SHORT, *ALONE]), "-o", str(output)]

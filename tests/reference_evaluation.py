@@ -72,18 +72,6 @@ def clear(scene: Scene, gate: float) -> dict[str, float]:
     return {name: counts[name] for name in ("TP", "kept", "IDSW", "Frag", "MT", "ML", "false_tracks")}
 
 
-def idf1(scene: Scene, gate: float) -> float:
-    """Best one-to-one naming of people by tracks, all namings tried."""
-    people = sorted({p for frame, _ in scene for p in frame})
-    tracks = sorted({t for _, frame in scene for t in frame})
-    together = Counter[tuple[int, int]]()
-    for here, tracks_here in scene:
-        together.update((p, t) for p in here for t in tracks_here if math.dist(here[p], tracks_here[t]) <= gate)
-    true = max(sum(together[pair] for pair in naming.items()) for naming in matchings(people, tracks))
-    total = sum(len(here) + len(tracks_here) for here, tracks_here in scene)
-    return 2 * true / total if people and tracks else 0.0
-
-
 def hota(scene: Scene, radius: float) -> float:
     """HOTA as Luiten et al. write it: for every true positive c, A(c) = TPA / (TPA + FNA + FPA)."""
     person_frames = Counter(p for here, _ in scene for p in here)

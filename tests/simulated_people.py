@@ -37,9 +37,7 @@ BORDER = open_area()
 def rows_of(people: Mapping[int, tuple[Path, float, range]], noise: float = 0.02) -> Rows:
     """TRAJECTORY rows of people who walk paths, so tall, in these frames; sorted by frame, then id."""
     rng = np.random.default_rng(3)
-    told = sorted(
-        (frame, track, path(frame / RATE), tall) for track, (path, tall, frames) in people.items() for frame in frames
-    )
+    told = sorted((t, track, path(t / RATE), tall) for track, (path, tall, frames) in people.items() for t in frames)
     rows = np.zeros(len(told), TRAJECTORY)
     for row, (frame, track, place, tall) in zip(rows, told, strict=True):
         row["frame"], row["id"], row["height"] = frame, track, tall + rng.normal(0, CONFIG.tracking.height_noise)
@@ -191,9 +189,7 @@ def walking(cameras: int = 3, people: int = 2, seconds: float = 40.0, seed: int 
 
 def delayed(scene: Walking, delays: list[int]) -> Walking:
     """The same where each view's stream began so many frames earlier."""
-    endpoints = tuple(
-        replace(one, frame=one.frame + late) for one, late in zip(scene.views.endpoints, delays, strict=True)
-    )
+    endpoints = tuple(replace(one, frame=one.frame + k) for one, k in zip(scene.views.endpoints, delays, strict=True))
     return replace(scene, views=replace(scene.views, endpoints=endpoints))
 
 

@@ -1,10 +1,13 @@
 """Hypothesis strategies for geometry: cameras that watch an area, grids, rigs, recordings."""
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import rotation_towards
 
@@ -32,6 +35,17 @@ LENSES: tuple[tuple[tuple[float, ...], LensModel], ...] = (
 def examples(number: int) -> int:
     """Number of examples of a property: a third, all with STSEG_ALL_EXAMPLES, a fifth with kernels as plain Python."""
     return -(-number // (5 if not COMPILED else 1 if "STSEG_ALL_EXAMPLES" in os.environ else 3))
+
+
+def drawn(
+    number: int, *strategies: st.SearchStrategy[Any], **named: st.SearchStrategy[Any]
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """A property of drawn values, as many as examples() makes of a number."""
+
+    def tested(test: Callable[..., None]) -> Callable[..., None]:
+        return settings(max_examples=examples(number))(given(*strategies, **named)(test))
+
+    return tested
 
 
 @dataclass(frozen=True)

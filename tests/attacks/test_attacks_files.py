@@ -105,8 +105,7 @@ def test_damaged_time_stamps_are_made_anew(tmp_path: Path) -> None:
         path = work.path / "streams.npz"
         whole = path.read_bytes()
         kept = work.streams(recording)
-        assert kept is not None
-        assert kept.length == 4
+        assert kept is not None and kept.length == 4
         path.write_bytes(b"")
         assert work.streams(recording) is None
         for place in range(0, len(whole), 3):
@@ -145,8 +144,7 @@ SIZE = (64, 48)
 def test_a_name_of_a_million_digits_is_numbered_in_time() -> None:
     begun = time.monotonic()
     numbers = last_numbers(["a" + "9" * 1_000_000, "7" * 1_000_000 + "b"])
-    assert numbers is not None
-    assert numbers.tolist() == [10**15 - 1, 777_777_777_777_777]
+    assert numbers is not None and numbers.tolist() == [10**15 - 1, 777_777_777_777_777]
     assert time.monotonic() - begun < REFUSAL_TIME
 
 
@@ -178,8 +176,7 @@ def test_a_parquet_file_of_many_rows_or_another_type_is_refused(tmp_path: Path) 
     parquet.write_table(arrow.table(dict.fromkeys(names, zeros)), path, compression="zstd")
     assert path.stat().st_size < 1_000_000
     refused(FormatError, "rows, more than", read_source, Source("boxes", path), SIZE)
-    nested = arrow.array([[1]])
-    parquet.write_table(arrow.table(dict.fromkeys(names, nested)), path)
+    parquet.write_table(arrow.table(dict.fromkeys(names, arrow.array([[1]]))), path)
     refused(FormatError, r"row 0: found frame \[1\]", read_source, Source("boxes", path), SIZE)
 
 
@@ -189,9 +186,6 @@ def test_names_of_people_are_printable(tmp_path: Path, name: str) -> None:
     refused(FormatError, "line 2: found name '", read_names, tmp_path / "names.csv")
     (tmp_path / "answers.csv").write_text(f"action,id,name\nname,1,{name}\n")
     refused(FormatError, "line 2: found name '", read_answers, tmp_path / "answers.csv", ("name",))
-
-
-def test_names_may_be_anything_that_prints(tmp_path: Path) -> None:
     (tmp_path / "names.csv").write_text("id,name\n1,<b>Ann/Bob</b>\n2,Ω\n", "utf-8")
     assert read_names(tmp_path / "names.csv") == {1: "<b>Ann/Bob</b>", 2: "Ω"}
 
@@ -199,8 +193,7 @@ def test_names_may_be_anything_that_prints(tmp_path: Path) -> None:
 def test_boxes_far_beyond_the_image_become_no_masks() -> None:
     far = np.array([[-1e12, -1e12, 2e12, 2e12], [1e11, 5.0, 9.0, 9.0]])
     found = Detections(np.zeros(2, np.int64), far, np.ones(2))
-    assert (instance_image(found, [0], SIZE) == 1).all()
-    assert not instance_image(found, [1], SIZE).any()
+    assert (instance_image(found, [0], SIZE) == 1).all() and not instance_image(found, [1], SIZE).any()
 
 
 @pytest.mark.parametrize("frames", [(1, 10**9), (1, 900_000), (5, 1)])

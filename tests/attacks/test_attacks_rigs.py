@@ -32,7 +32,6 @@ from stseg.io.recording.video.packets import PictureHeads
 from stseg.io.untrusted.numpy_files import parse_npy
 
 SCENE = ("--area=0,0,1,1", "--frame-rate=5")
-LENS = "matrix = [[50.0,0,32],[0,50.0,24],[0,0,1]]"
 
 
 @cases(
@@ -123,9 +122,7 @@ def test_pipes_are_not_waited_for(tmp_path: Path, refusal: Command) -> None:
 
 
 @pytest.mark.parametrize("given", [None, "protocol_whitelist;rtsp"])
-def test_ffmpeg_has_its_options_while_it_opens_alone(
-    given: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ffmpeg_has_options_while_it_opens(given: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Files alone for a file, though a stream is being opened by another thread; and then what it had before."""
     film(tmp_path / "a.avi", tmp_path / "plain.avi")
     found: dict[str, str | None] = {}
@@ -163,10 +160,8 @@ def test_damaged_pictures_are_answered_in_one_line(
         data = bytearray(cv2.imencode(suffix, picture)[1])
         data[len(data) // 2 : len(data) // 2 + 3000] = bytes(3000)
         (tmp_path / f"a{suffix}").write_bytes(data[:-2000])
-        status, printed = (
-            main(["calibrate", "page", f"a{suffix}", "-o", "p.html", "--overwrite"]),
-            capfd.readouterr().err,
-        )
+        status = main(["calibrate", "page", f"a{suffix}", "-o", "p.html", "--overwrite"])
+        printed = capfd.readouterr().err
         assert status in (0, 2) and printed.count("\n") == (status == 2), printed
 
 

@@ -52,9 +52,7 @@ def places(calls: tuple[str, ...], fault: str) -> list[int]:
 @pytest.mark.parametrize(
     "fault", ["kill", "kill after", "short", *map(str, (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EACCES))]
 )
-def test_no_fault_loses_anything(
-    driver: Driver, whole: tuple[Path, tuple[str, ...]], tmp_path: Path, fault: str
-) -> None:
+def test_a_fault_loses_nothing(driver: Driver, whole: tuple[Path, tuple[str, ...]], tmp_path: Path, fault: str) -> None:
     expected, calls = whole
     for at in places(calls, fault):
         output, call = tmp_path / str(at) / "run.h5", f"call {at}, {calls[at]}"

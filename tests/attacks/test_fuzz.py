@@ -7,10 +7,9 @@ from pathlib import Path
 import pytest
 from fuzz.runner import fuzz
 from fuzz.targets import TARGETS, Target, answer
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import in_ci
-from strategies import examples
+from strategies import drawn
 
 from stseg.errors import printable
 from stseg.io.toml import parse_toml
@@ -35,8 +34,7 @@ def test_mutated_files_are_answered(target: Target, seeds: tuple[int, int]) -> N
     assert not failures
 
 
-@settings(max_examples=examples(200), deadline=None)
-@given(st.text(max_size=40))
+@drawn(200, st.text(max_size=40))
 def test_numbers_are_those_of_python_or_none(text: str) -> None:
     number = parse_number(text)
     assert number != number or number == float(text)
@@ -44,16 +42,13 @@ def test_numbers_are_those_of_python_or_none(text: str) -> None:
     assert whole is None or whole == int(text)
 
 
-@settings(max_examples=examples(200), deadline=None)
-@given(st.text(max_size=40))
+@drawn(200, st.text(max_size=40))
 def test_names_and_errors_are_printable(text: str) -> None:
-    assert printable(text).isprintable()
-    assert abbreviated(text).isprintable()
+    assert printable(text).isprintable() and abbreviated(text).isprintable()
     assert not is_name(text) or Path(text).name == text
 
 
-@settings(max_examples=examples(200), deadline=None)
-@given(st.text(st.sampled_from("ab.=[]{}\"'#\n 19-_eE+,"), max_size=60))
+@drawn(200, st.text(st.sampled_from("ab.=[]{}\"'#\n 19-_eE+,"), max_size=60))
 def test_any_text_is_toml_or_one_line(text: str) -> None:
     try:
         parse_toml(text)

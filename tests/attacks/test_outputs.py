@@ -9,6 +9,7 @@ from unittest.mock import Mock
 import cv2
 import numpy as np
 import pytest
+from cases import tables
 from refusals import Command
 from run_files import write_small_run
 
@@ -17,24 +18,7 @@ from stseg.commands.terminal import standard_error
 from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS, ExportFormat
 
-COMMANDS = {
-    "run rig.toml -o": ("rig.toml", "west.csv"),
-    "report run.h5 --truth truth.csv --names names.csv -o": ("run.h5", "truth.csv", "names.csv", "left.avi"),
-    "report run.h5 --video": ("left.avi",),
-    "export run.h5 --to csv --names names.csv -o": ("run.h5", "names.csv", "left.avi"),
-    "export run.h5 more.h5 --to sqlite -o": ("run.h5", "more.h5"),
-    "correct run.h5 answers.csv -o": ("run.h5", "answers.csv", "left.avi"),
-    "review run.h5 -o": ("run.h5", "left.avi"),
-    "inspect run.h5 --slice frame=11,plane=all -o": ("run.h5", "left.avi"),
-    "calibrate points points.csv --size 64,48 --area 0,0,4,3 --frame-rate 5 -o": ("points.csv",),
-    "calibrate import opencv lens.xml --size=640,480 --unit=mm --up=-z --frame-rate=5 --area=-1,0.5,1,3 -o": (
-        "lens.xml",
-    ),
-    "calibrate page photo.png --area 0,0,4,3 --plan plan.png -o": ("photo.png", "plan.png"),
-    "calibrate lens photo.png --board 5,4 -o": ("photo.png",),
-    "calibrate check rig.toml -o": ("rig.toml", "west.csv"),
-    "calibrate auto left.avi right.avi --frame-rate 5 -o": ("left.avi",),
-}
+COMMANDS = tables(Path(__file__).with_suffix(".toml"))["commands"]
 """Commands without their output, and their inputs."""
 
 
@@ -66,9 +50,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_no_command_replaces_what_it_reads(
-    folder: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch, command: str
-) -> None:
+def test_commands_keep_inputs(folder: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
     """By name, by another name of the same file, and through a link; be it ours or not."""
     monkeypatch.setattr("stseg.io.outputs.whole_files._is_ours", lambda *_: True)
     for name in COMMANDS[command]:
@@ -78,11 +60,19 @@ def test_no_command_replaces_what_it_reads(
         for output in (name, "hard.mp4", "soft.mp4"):
             if "--video" not in command or output != name:
                 said = refusal(*command.split(), output, "--overwrite")
-                assert output in said
-                assert "a file that is read here" in said
+                assert output in said and "a file that is read here" in said
         assert contents(folder) == before
         Path("hard.mp4").unlink()
         Path("soft.mp4").unlink()
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.usefixtures("folder")
+def test_commands_keep_what_stseg_did_not_make(refusal: Command, command: str) -> None:
+    Path("old.mp4").write_text("precious")
+    assert "a file that exists, expected a new name, or --over" in refusal(*command.split(), "old.mp4")
+    assert "a file that stseg did not make" in refusal(*command.split(), "old.mp4", "--overwrite")
+    assert Path("old.mp4").read_text() == "precious"
 
 
 def test_pictures_and_tables_replace_nothing_foreign(folder: Path, refusal: Command) -> None:
@@ -112,9 +102,7 @@ def test_an_export_is_replaced_by_its_like_alone(refusal: Command, to: str) -> N
 
 @pytest.mark.parametrize("to", [*FORMATS, *ARCHIVES])
 @pytest.mark.usefixtures("run_folder")
-def test_an_export_without_its_rows_is_not_published(
-    refusal: Command, monkeypatch: pytest.MonkeyPatch, to: str
-) -> None:
+def test_an_export_without_rows_is_not_published(refusal: Command, monkeypatch: pytest.MonkeyPatch, to: str) -> None:
     """As by a disk that is full and says nothing."""
     if to in ARCHIVES:
         monkeypatch.setattr("stseg.io.exports.archive._fill", lambda database, _: filled(database))

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import reference_belief as plain
 from coloured_people import FLOOR, RIG, follow, frame_of, observations_of, painted, rows_of
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import CONFIG, FRAME_RATE, SIZE, people
 from scipy.stats import multivariate_normal
-from strategies import cameras, examples
+from strategies import cameras, drawn
 
 from stseg.arrays import Bytes, Floats, Observation
 from stseg.baselines.du_piater_2006.exclusion import exclusion
@@ -50,8 +49,7 @@ def spots(data: st.DataObject, n: int) -> Floats:
     return np.array(data.draw(st.lists(st.tuples(*[st.floats(-2, 2)] * 2), min_size=n, max_size=n)))
 
 
-@settings(max_examples=examples(15))
-@given(st.data())
+@drawn(15, st.data())
 def test_a_prediction_is_a_mixture(data: st.DataObject) -> None:
     n, k = data.draw(st.integers(1, 5)), data.draw(st.integers(1, 4))
     centre, place = spots(data, n), spots(data, k)
@@ -92,15 +90,14 @@ def test_a_particle_comes_from_one_near_it() -> None:
     assert (origin == 2).all()
 
 
-@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8).filter(lambda w: sum(w) > 0.1), st.floats(0, 0.999))
+@drawn(100, st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8).filter(lambda w: sum(w) > 0.1), st.floats(0, 0.999))
 def test_drawn_as_often_as_the_weight_says(weight: list[float], lot: float) -> None:
     share = np.array(weight) / sum(weight)
     often = np.bincount(systematic(share, 40, lot), minlength=len(share))
     assert np.abs(often - 40 * share).max() < 1 + 1e-6
 
 
-@settings(max_examples=examples(20))
-@given(cameras(lenses=False), st.floats(-1, 1), st.floats(-1, 1))
+@drawn(20, cameras(lenses=False), st.floats(-1, 1), st.floats(-1, 1))
 def test_the_jacobians_are_slopes_of_the_homography(camera: Camera, x: float, y: float) -> None:
     view, ground = StarView.of(camera, RIG.grid), np.array([[x, y]])
     pixel = view.to_pixel(ground)
@@ -112,11 +109,9 @@ def test_the_jacobians_are_slopes_of_the_homography(camera: Camera, x: float, y:
 
 
 def test_a_view_shows_those_in_its_image_and_no_ground_above_it() -> None:
-    far = VIEWS[0].to_ground(np.array([[64.0, -400.0]]))
-    assert (np.abs(far) > 1e3).all()
+    assert (np.abs(VIEWS[0].to_ground(np.array([[64.0, -400.0]]))) > 1e3).all()
     assert np.isfinite(VIEWS[0].ground_slope(np.array([[64.0, -400.0]]))).all()
-    assert VIEWS[0].shows(np.zeros(2), 1.7, 0.5)
-    assert not VIEWS[0].shows(np.array([-3.4, -3.3]), 1.7, 0.5)
+    assert VIEWS[0].shows(np.zeros(2), 1.7, 0.5) and not VIEWS[0].shows(np.array([-3.4, -3.3]), 1.7, 0.5)
 
 
 def test_bins_of_colours() -> None:
@@ -127,8 +122,7 @@ def test_bins_of_colours() -> None:
         assert HSV_BINS[tuple(4 * c for c in colour)] in nearly | {plain.hsv_bin((blue, green, red))}
 
 
-@settings(max_examples=examples(10))
-@given(st.data())
+@drawn(10, st.data())
 def test_histograms(data: st.DataObject) -> None:
     image = np.random.default_rng(data.draw(st.integers(0, 99))).integers(0, 256, (40, 50, 3)).astype(np.uint8)
     edges = st.floats(-9.7, 45.3)
@@ -172,8 +166,7 @@ def test_who_stands_in_front() -> None:
     assert [len(b) for b in boxes] == [1, 0, 0]
 
 
-@settings(max_examples=examples(15))
-@given(st.data(), st.sampled_from(([0.1, 0.3, 0.0, 0.2], [0.0] * 4)))
+@drawn(15, st.data(), st.sampled_from(([0.1, 0.3, 0.0, 0.2], [0.0] * 4)))
 def test_messages_are_sums_over_the_potential(data: st.DataObject, likelihood: list[float]) -> None:
     ground, mapped = spots(data, 3), spots(data, 4)
     slope: Floats = np.array([[0.3, 0.1], [0.0, 0.2]]) * (1 + np.arange(4))[:, None, None]
@@ -188,8 +181,7 @@ def test_messages_are_sums_over_the_potential(data: st.DataObject, likelihood: l
     np.testing.assert_allclose(potential.to_view(weight), weight @ psi)
 
 
-@settings(max_examples=examples(15))
-@given(st.data())
+@drawn(15, st.data())
 def test_targets_exclude_each_other(data: st.DataObject) -> None:
     ground, weight = spots(data, 3), np.array([0.2, 0.5, 0.3])
     others = [Particles(spots(data, 3), np.zeros((3, 2)), weight) for _ in range(2)]
@@ -245,8 +237,7 @@ def test_two_who_pass_each_other_keep_their_numbers() -> None:
     for who, (x, y, dx, _) in enumerate(PASSING, start=1):
         own = rows[rows["id"] == who]
         away = np.hypot(own["x"] - (x + dx * own["frame"]), own["y"] - y)
-        assert away.max() < 0.25
-        assert np.median(away) < 0.12
+        assert away.max() < 0.25 and np.median(away) < 0.12
 
 
 def test_the_colours_lead_where_nobody_is_found() -> None:
@@ -305,5 +296,4 @@ def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
                 views[:2] = [np.full((*SIZE[::-1], 3), FLOOR, np.uint8)] * 2
             tracker.add(frame_of(frame, standing), FrameObservations(views, observations.evidence))
         away[way] = float(np.hypot(*(tracker.targets[0].star.ground.mean - standing[0, :2])))
-    assert away["messages"] < 0.15
-    assert away["condensation"] > away["messages"]
+    assert away["messages"] < 0.15 and away["condensation"] > away["messages"]

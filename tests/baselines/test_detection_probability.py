@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_detection_probability as reference
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example
 from hypothesis import strategies as st
 from refusals import refused
 from scenes import corner_cameras, likelihoods, looking, people, rig_of
-from strategies import BARREL, cameras, examples, numbers
+from strategies import BARREL, cameras, drawn, numbers
 
 from stseg.arrays import Floats, Singles
 from stseg.baselines.huang_wang_2012.detection_probability import DetectionProbability, fill_chance
@@ -22,7 +22,6 @@ from stseg.geometry.summed_area import TOP_LEVEL, fill_summed_area
 
 FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
 HEIGHTS = np.array([1.5, 1.7, 1.9])
-PAD = 60
 
 
 def probability(views: tuple[Camera, ...] = corner_cameras(), config: ProposalConfig = FEW) -> DetectionProbability:
@@ -59,8 +58,7 @@ def strips(draw: st.DrawFn) -> Pillars:
     return Pillars(upright, one, two, three, base)
 
 
-@settings(max_examples=examples(60))
-@given(maps(), strips(), numbers(0.01, 0.5))
+@drawn(60, maps(), strips(), numbers(0.01, 0.5))
 def test_the_kernel_is_the_definition(likelihood: Singles, pillars: Pillars, outside: float) -> None:
     rng, widths = np.random.default_rng(0), np.array([0.2, 0.3, 0.4])
     height_share, width_share = (rng.dirichlet(np.ones(n)) for n in (pillars.middle.shape[1] - pillars.base, 3))
@@ -117,8 +115,7 @@ def test_strips_cover_what_the_pillar_does(view: str) -> None:
     assert np.mean(shares) > np.mean([overlap(boxed(image), image) for image in one_box])
 
 
-@settings(max_examples=examples(25))
-@given(cameras(lenses=False))
+@drawn(25, cameras(lenses=False))
 def test_a_pillar_stands_where_the_homographies_say(camera: Camera) -> None:
     # On the axis, at each end of the strips above the caps, whatever the camera.
     pillars = Pillars.of(camera, np.zeros((1, 2)), HEIGHTS, 1e-9)
@@ -186,8 +183,7 @@ def test_it_is_highest_at_people_through_a_lens_and_a_roll(camera: int) -> None:
     said = asked.log_ratio(likelihoods(views, standing))
     weight = np.where(said > 0, np.exp(said), 0.0)
     found = modes(weight, asked.ground, asked.spacing, 0.4)
-    assert len(found) == 1
-    assert np.hypot(*(found.ground[0] - standing[0, :2])) < 0.1
+    assert len(found) == 1 and np.hypot(*(found.ground[0] - standing[0, :2])) < 0.1
     assert np.sqrt(np.linalg.eigvalsh(found.covariance[0])).max() < 0.3
 
 
@@ -216,8 +212,7 @@ def lattices(draw: st.DrawFn) -> Floats:
     return np.asarray(np.where(rng.random((rows, columns)) < 0.5, rng.random((rows, columns)) ** 3, 0.0))
 
 
-@settings(max_examples=examples(40))
-@given(lattices(), numbers(0.6, 3.0))
+@drawn(40, lattices(), numbers(0.6, 3.0))
 def test_samples_move_as_the_formula_says(weight: Floats, reach: float) -> None:
     found, mode = np.empty((np.count_nonzero(weight), 2)), np.empty(np.count_nonzero(weight), np.int64)
     number = fill_modes(weight, reach, found, mode)
@@ -227,15 +222,13 @@ def test_samples_move_as_the_formula_says(weight: Floats, reach: float) -> None:
     np.testing.assert_array_equal(mode, own)
 
 
-@settings(max_examples=examples(30))
-@given(lattices(), numbers(0.2, 1.0))
+@drawn(30, lattices(), numbers(0.2, 1.0))
 @example(np.zeros((4, 5)), 0.4)
 def test_modes_share_all_samples_out(weight: Floats, kernel: float) -> None:
     rows, columns = weight.shape
     ground = np.stack(np.meshgrid(1 + 0.25 * np.arange(columns), -2 + 0.25 * np.arange(rows)), -1)
     found = modes(weight, ground, 0.25, kernel)
-    assert found.weight.sum() == pytest.approx(weight.sum())
-    assert (np.diff(found.weight) <= 0).all()
+    assert found.weight.sum() == pytest.approx(weight.sum()) and (np.diff(found.weight) <= 0).all()
     np.testing.assert_allclose(found.weight @ found.ground, (weight[..., None] * ground).sum((0, 1)), atol=1e-9)
     assert (np.linalg.eigvalsh(found.covariance) > 0.25**2 / 12 - 1e-9).all()
 

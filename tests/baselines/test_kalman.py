@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import CONFIG, FRAME_RATE, found, people, room
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Floats, Rows
 from stseg.baselines.huang_wang_2012.kalman import KalmanTracker
@@ -49,8 +48,7 @@ def plain(places: Floats, noise: float, seconds: float, config: MotionConfig) ->
     return state, covariance
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.floats(0.02, 0.5))
-@settings(max_examples=examples(30))
+@drawn(30, st.integers(0, 2**32 - 1), st.integers(1, 6), st.floats(0.02, 0.5))
 def test_filters_side_by_side_are_each_a_plain_one(seed: int, length: int, seconds: float) -> None:
     config, noise = MotionConfig(), 0.03
     paths = np.random.default_rng(seed).normal(0.0, 1.0, (3, length, 2))
@@ -107,8 +105,7 @@ def test_who_is_not_found_for_too_long_is_forgotten() -> None:
 def test_rows_hold_filtered_and_detected_places() -> None:
     jitter = [0.0, 0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1]
     rows, _ = follow([[(0.0, y)] for y in jitter])
-    assert rows["raw_y"].tolist() == jitter
-    assert np.abs(rows["y"][4:]).max() < 0.08
+    assert rows["raw_y"].tolist() == jitter and np.abs(rows["y"][4:]).max() < 0.08
     assert (rows["xx"][1:] < rows["xx"][0]).all()
 
 
@@ -119,8 +116,7 @@ def test_identities_stand_short_tracks_go_and_gaps_are_filled() -> None:
     whole = committed_tracks(rows, events, FRAME_RATE, CONFIG.tracking)
     assert whole.trajectory["id"].tolist() == [1] * 18
     assert whole.trajectory["frame"].tolist() == list(range(18))
-    assert sorted(set(whole.identity.tolist())) == [0, 1]
-    assert b"dropped" in whole.events["kind"].tolist()
+    assert sorted(set(whole.identity.tolist())) == [0, 1] and b"dropped" in whole.events["kind"].tolist()
 
 
 def test_heights_tell_apart_two_who_turn_back_where_they_meet() -> None:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import reference_particles as plain
 from coloured_people import RIG, SHIRTS, follow, frame_of, observations_of, painted, rows_of
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import CONFIG, SIZE, corner_cameras, looking, mask, people
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Floats, Rows, Singles
 from stseg.baselines.colour_views import colour_views
@@ -54,13 +53,11 @@ GROUPS = st.integers(0, 2**32 - 1).map(
 def test_normalised_colours_forget_the_light() -> None:
     dark, bright = np.array([[[20, 40, 60]]], np.uint8), np.array([[[60, 120, 180]]], np.uint8)
     a, b = normalised(dark)[0, 0].astype(int), normalised(bright)[0, 0].astype(int)
-    assert (a[:2] == b[:2]).all()
-    assert (a[2], b[2]) == (40, 120)
+    assert (a[:2] == b[:2]).all() and (a[2], b[2]) == (40, 120)
     assert normalised(np.zeros((1, 1, 3), np.uint8)).tolist() == [[[0, 0, 0]]]
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(20))
+@drawn(20, st.integers(0, 2**32 - 1))
 def test_density_is_equation_1(seed: int) -> None:
     rng = np.random.default_rng(seed)
     colour = rng.integers(90, 130, (3, 4, 3), np.uint8)
@@ -77,14 +74,11 @@ def test_density_is_equation_1(seed: int) -> None:
 def test_histograms_share_out_their_samples() -> None:
     colour = np.array([[0, 0, 0], [0, 0, 0], [255, 255, 255]], np.uint8)
     shares = histogram(colour)
-    assert shares.sum() == pytest.approx(1)
-    assert shares[0] == pytest.approx(2 / 3)
-    assert bins_of(colour).tolist() == [0, 0, int(np.prod(BINS)) - 1]
-    assert histogram(colour[:0]).sum() == 0
+    assert shares.sum() == pytest.approx(1) and shares[0] == pytest.approx(2 / 3)
+    assert bins_of(colour).tolist() == [0, 0, int(np.prod(BINS)) - 1] and histogram(colour[:0]).sum() == 0
 
 
-@given(GROUPS)
-@settings(max_examples=examples(5))
+@drawn(5, GROUPS)
 def test_segmentation_is_equations_2_to_4(standing: Floats) -> None:
     ideal, rng = raster(CAMERA), np.random.default_rng(3)
     shape = ideal.shape[:2]
@@ -132,12 +126,10 @@ def test_what_is_open_is_in_front() -> None:
     fill_unoccluded(bodies[1:], np.array([0]), boxes[:1], ideal, HALF_WIDTH, PARTS, free, lone, alone)
     assert seen[1] < 0.6 * alone[0]
     behind = owner // len(PARTS) == 1
-    assert behind.sum() < (lone >= 0).sum()
-    assert (lone[behind] >= 0).all()
+    assert behind.sum() < (lone >= 0).sum() and (lone[behind] >= 0).all()
 
 
-@given(st.lists(st.floats(-5, 5), min_size=3, max_size=25))
-@settings(max_examples=examples(50))
+@drawn(50, st.lists(st.floats(-5, 5), min_size=3, max_size=25))
 def test_the_middle_of_the_shortest_half_is_the_least_median(distances: list[float]) -> None:
     array = np.array(distances)
     middle = _middle_of_shortest_half(array.copy())
@@ -160,12 +152,10 @@ def test_the_axis_of_a_whole_body_passes_through_its_place(median: bool) -> None
         feet, _ = camera.project(standing[0, :2], 0.0)
         expected = plain.ground_line(camera, feet)
         assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < (0.08 if median else 0.04)
-        assert abs(abs(axes[0, :2] @ expected[:2]) - 1) < 1e-3
-        assert axes[0, 3] > 0.7
+        assert abs(abs(axes[0, :2] @ expected[:2]) - 1) < 1e-3 and axes[0, 3] > 0.7
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(0, 4))
-@settings(max_examples=examples(30))
+@drawn(30, st.integers(0, 2**32 - 1), st.integers(0, 4))
 def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0, np.pi, (views, 2))
@@ -178,8 +168,7 @@ def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
     assert farthest == pytest.approx(np.hypot(*(ground - before).T).max())
 
 
-@given(GROUPS)
-@settings(max_examples=examples(6))
+@drawn(6, GROUPS)
 def test_misfit_is_equations_6_and_7(standing: Floats) -> None:
     ideal, rng = raster(CAMERA, 8), np.random.default_rng(5)
     shape, bodies = ideal.shape[:2], bodies_of(CAMERA, standing)
@@ -199,8 +188,7 @@ def test_particles_are_drawn_by_their_weights() -> None:
     rng = np.random.default_rng(2)
     particles = np.arange(8.0).reshape(4, 1, 2)
     weight = particle_weights(np.array([0.0, 0.0, 50.0, 1.0]), 2.0)
-    assert weight.sum() == pytest.approx(1)
-    assert weight[3] / weight[0] == pytest.approx(np.exp(-2.0))
+    assert weight.sum() == pytest.approx(1) and weight[3] / weight[0] == pytest.approx(np.exp(-2.0))
     drawn = np.concatenate([resampled(particles, weight, rng)[:, 0, 0] for _ in range(500)])
     for place, expected in zip(particles[:, 0, 0], weight, strict=True):
         assert (drawn == place).mean() == pytest.approx(expected, abs=0.01)
@@ -216,8 +204,7 @@ def test_appearances_fill_and_are_renewed_slowly() -> None:
     assert one.usable_samples.tolist() == [0, 0, 0]  # too few
     assert one.reference.sum() == 0
     full = one.learned(1, red, 0.1, rng)
-    assert full.usable_samples.tolist() == [0, SAMPLES, 0]
-    assert full.reference[1].max() == 1
+    assert full.usable_samples.tolist() == [0, SAMPLES, 0] and full.reference[1].max() == 1
     later = full
     for _ in range(5):
         later = later.learned(1, blue, 0.1, rng)
@@ -239,12 +226,10 @@ FRAMES = 16 if COMPILED else 6
 
 def test_people_are_followed_by_their_colours() -> None:
     rows = passing(QUICK, FRAMES)
-    assert np.unique(rows["id"]).tolist() == [1, 2]
-    assert len(rows) == 2 * FRAMES
+    assert np.unique(rows["id"]).tolist() == [1, 2] and len(rows) == 2 * FRAMES
     x = np.where(rows["id"] == 1, -1.2 + 0.1 * rows["frame"], 1.2 - 0.1 * rows["frame"])
     off = np.hypot(rows["x"] - x, rows["y"] - np.where(rows["id"] == 1, -0.3, 0.3))
-    assert off.mean() < 0.1
-    assert off.max() < 0.35
+    assert off.mean() < 0.1 and off.max() < 0.35
     assert (rows["xx"] > 0).all()
 
 
@@ -316,5 +301,4 @@ def test_a_lens_bends_the_raster_not_the_people() -> None:
     frame = view.prepare(seen, standing[:, :2], standing[:, 2], [PersonAppearance.unknown()], np.array([0.3]))
     axes = np.zeros((1, 4))
     frame.fill_axes(standing[:, :2], True, axes)
-    assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < 0.05
-    assert axes[0, 3] > 0.5
+    assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < 0.05 and axes[0, 3] > 0.5

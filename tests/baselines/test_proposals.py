@@ -6,24 +6,8 @@ from typing import Literal
 
 import numpy as np
 import pytest
+import scenes
 from recordings import in_ci
-from scenes import (
-    BODY,
-    CONFIG,
-    FEW_HEIGHTS,
-    box_frame_sets,
-    corner_cameras,
-    detector_of,
-    evidence_of,
-    expecting,
-    mask_frame_sets,
-    no_boxes,
-    people,
-    rig_of,
-    room,
-    standing_at,
-    walkers,
-)
 
 from stseg.arrays import ViewEvidence
 from stseg.baselines.huang_wang_2012.proposals import Fuse, Proposals, empty_explanation, marginal
@@ -35,22 +19,22 @@ from stseg.occupancy.volume import Occupancy
 from stseg.records.candidates import Candidates
 
 Asked = Literal["lattice", "probability", "volume", "both"]
-VIEWS = corner_cameras()
-RIG = rig_of(VIEWS, cell=0.2, planes=5)
-STANDING = people((-1.0, -0.6), (0.9, 0.7), (1.0, -1.1))
+VIEWS = scenes.corner_cameras()
+RIG = scenes.rig_of(VIEWS, cell=0.2, planes=5)
+STANDING = scenes.people((-1.0, -0.6), (0.9, 0.7), (1.0, -1.1))
 FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
 
 
 def evidence(kind: str) -> list[ViewEvidence]:
-    return evidence_of(kind, VIEWS, STANDING)
+    return scenes.evidence_of(kind, VIEWS, STANDING)
 
 
 def candidates(kind: str, asked: Asked) -> Proposals:
-    return Proposals(RIG, [kind] * 4, replace(CONFIG, proposals=replace(FEW, source=asked)))
+    return Proposals(RIG, [kind] * 4, replace(scenes.CONFIG, proposals=replace(FEW, source=asked)))
 
 
 def fuse(kind: str) -> Fuse:
-    occupancy = Occupancy(RIG, [kind] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
+    occupancy = Occupancy(RIG, [kind] * 4, scenes.CONFIG.occupancy, scenes.FEW_HEIGHTS, scenes.BODY)
     return lambda seen, explanation: occupancy.fuse(seen, explanation).dense()
 
 
@@ -67,14 +51,16 @@ def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
     # What boxes say of a place in a volume reaches far to its sides: their modes are no better than the pass's lattice.
     assert (away.min(0) < (0.5 if kind == "boxes" and asked == "volume" else 0.25)).all()
     apart = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
-    assert (apart[np.triu_indices(len(found), 1)] >= FEW_HEIGHTS.lattice_spacing).all()
+    assert (apart[np.triu_indices(len(found), 1)] >= scenes.FEW_HEIGHTS.lattice_spacing).all()
 
 
 def test_the_lattice_alone_proposes_nothing() -> None:
-    assert find_candidate_source(RIG, ["pixels"] * 4, CONFIG) is None
+    assert find_candidate_source(RIG, ["pixels"] * 4, scenes.CONFIG) is None
 
 
-@pytest.mark.parametrize("seen", ([None] * 4, [no_boxes()] * 4, [None, no_boxes(), None, no_boxes()]))
+@pytest.mark.parametrize(
+    "seen", ([None] * 4, [scenes.no_boxes()] * 4, [None, scenes.no_boxes(), None, scenes.no_boxes()])
+)
 def test_where_nothing_is_seen_nobody_is_proposed(seen: Sequence[ViewEvidence]) -> None:
     assert len(candidates("boxes", "both").of(list(seen), fuse("boxes"))) == 0
 
@@ -86,12 +72,11 @@ def test_both_sources_have_no_duplicates_of_each_other() -> None:
 
 
 def test_the_volume_without_explanation_is_filled_at_people() -> None:
-    occupancy = Occupancy(RIG, ["pixels"] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
+    occupancy = Occupancy(RIG, ["pixels"] * 4, scenes.CONFIG.occupancy, scenes.FEW_HEIGHTS, scenes.BODY)
     seen = evidence("pixels")
     filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)).dense())
     away = np.hypot(*np.moveaxis(RIG.grid.ground[:, :, None] - STANDING[:, :2], -1, 0)).min(-1)
-    assert filled[away < 0.12].min() > 0.5
-    assert filled[away > 0.8].max() < 0.1
+    assert filled[away < 0.12].min() > 0.5 and filled[away > 0.8].max() < 0.1
 
 
 def test_duplicates_are_dropped_in_order() -> None:
@@ -102,13 +87,12 @@ def test_duplicates_are_dropped_in_order() -> None:
     assert len(pool((0.0, 0.0), (0.05, 0.0)).joined_if_distant(pool(), 0.25)) == 2
     taller = Candidates(known.ground, known.height + np.array([0.0, 0.1]), known.width)
     np.testing.assert_array_equal(taller.new_to(known).ground, [[1.0, 0.0]])
-    assert len(known.new_to(known)) == 0
-    assert len(known.new_to(pool())) == 2
+    assert len(known.new_to(known)) == 0 and len(known.new_to(pool())) == 2
 
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_detection_keeps_people_of_proposals_and_drops_others(kind: str) -> None:
-    frame_pass = detector_of(RIG, kind)
+    frame_pass = scenes.detector_of(RIG, kind)
     proposed = pool(*(tuple(place) for place in STANDING[:, :2]), (-1.5, 1.5), (0.0, 1.6))
     plain, given = (frame_pass.explain(evidence(kind), None, asked).people for asked in (None, proposed))
     assert len(plain) == len(given) == len(STANDING)
@@ -117,8 +101,8 @@ def test_detection_keeps_people_of_proposals_and_drops_others(kind: str) -> None
 
 
 def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
-    frame_pass = detector_of(RIG, "pixels")
-    expected = expecting(*STANDING.tolist())
+    frame_pass = scenes.detector_of(RIG, "pixels")
+    expected = scenes.expecting(*STANDING.tolist())
     proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
     found = frame_pass.explain(evidence("pixels"), expected, proposed).people
     assert sorted(found.track_index) == [0, 1, 2]
@@ -127,15 +111,14 @@ def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
 @pytest.mark.parametrize("asked", ["both", *in_ci("probability", "volume")])
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Asked) -> None:
-    rig, truth = room(), walkers(2)
-    moments = list((box_frame_sets if kind == "boxes" else mask_frame_sets)(rig, truth, 0, 2))
-    config = replace(CONFIG, proposals=replace(FEW, source=asked))
+    rig, truth = scenes.room(), scenes.walkers(2)
+    moments = list((scenes.box_frame_sets if kind == "boxes" else scenes.mask_frame_sets)(rig, truth, 0, 2))
+    config = replace(scenes.CONFIG, proposals=replace(FEW, source=asked))
     pipeline = Pipeline(rig, [kind] * 4, config, "frames")
-    rows = np.concatenate(
-        [s.commit.trajectory for s in run_session(pipeline, [ViewForeground()] * 4, moments, 0, lambda _: None)]
-    )
+    steps = run_session(pipeline, [ViewForeground()] * 4, moments, 0, lambda _: None)
+    rows = np.concatenate([step.commit.trajectory for step in steps])
     for frame in range(2):
-        own, standing = rows[rows["frame"] == frame], standing_at(truth, frame)
+        own, standing = rows[rows["frame"] == frame], scenes.standing_at(truth, frame)
         assert len(own) == len(standing)
         away = np.hypot(own["x"][:, None] - standing[:, 0], own["y"][:, None] - standing[:, 1])
         assert away.min(1).max() < 0.3

@@ -7,33 +7,39 @@ import cv2
 import numpy as np
 import pytest
 from cases import cases
-from hypothesis import given, settings
+from films import write_at_rate
 from hypothesis import strategies as st
 from recordings import in_ci
 from refusals import refused
 from simulated_people import Walking, changed, delayed, walking
-from strategies import examples
+from strategies import drawn
 
-from stseg.arrays import Floats, Singles
+from stseg.arrays import Bytes, Floats, Singles
 from stseg.calibration.adjusted_rig import cameras_of, centred, grid_of, offsets_of, reports_of, scaled
-from stseg.calibration.automatic.auto import (
-    align_all,
-    calibrate_from_people,
-    merge_views,
-    require_merged,
-    sharpen_by_floor,
-)
+from stseg.calibration.automatic import auto
+from stseg.calibration.automatic.auto import align_all, merge_views, placed_views
 from stseg.calibration.automatic.correspondence import match_endpoints
 from stseg.calibration.automatic.endpoints import Endpoints, upright_endpoints
+from stseg.calibration.automatic.floor_features import Marks, floor_marks
 from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measured, scale_spread
 from stseg.calibration.automatic.single_view import view_of_upright
-from stseg.calibration.automatic.solution import SolvedViews, refine_cameras
+from stseg.calibration.automatic.solution import (
+    SolvedViews,
+    refine_cameras,
+    refine_with_marks,
+    single_view_cameras,
+    view_places,
+)
 from stseg.calibration.automatic.view_alignment import ViewPlaces, align, mirrored
 from stseg.calibration.bundle_adjustment import residuals
-from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
+from stseg.calibration.pinhole import CENTRE, SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto
 from stseg.errors import ConfigError, SourceError
+from stseg.geometry import Camera, Grid
 from stseg.io.recording.rigs import read_recording
+from stseg.simulation import SceneSpec
+from stseg.simulation.rendering.cameras import build_rig, pixel_rays
+from stseg.simulation.rendering.room import render_room
 from stseg.tasks.calibration.automatic import frame_rate_notes
 
 IMAGE = (480, 360)
@@ -54,16 +60,14 @@ def pixels(view: Floats, points: Floats) -> Floats:
 SPOTS = np.array([[0.0, 0.0, 0.0], [1.5, 0.5, 1.7], [-1.0, 1.0, 0.9], [0.3, -1.0, 1.7]])
 
 
-@settings(max_examples=examples(20))
-@given(st.floats(0.5, 1.5), st.floats(0.15, 0.7), st.floats(-0.1, 0.1), st.floats(-0.35, 0.1))
+@drawn(20, st.floats(0.5, 1.5), st.floats(0.15, 0.7), st.floats(-0.1, 0.1), st.floats(-0.35, 0.1))
 def test_a_pinhole_shows_what_its_camera_shows(focal: float, pitch: float, roll: float, k1: float) -> None:
     view = a_view(focal, pitch, roll, k1)
     projected, _ = as_camera(view, "a", IMAGE).project(SPOTS[:, :2], SPOTS[:, 2])
     np.testing.assert_allclose(pixels(view, SPOTS), projected, atol=1e-6)
 
 
-@settings(max_examples=examples(20))
-@given(st.floats(-3, 3), st.floats(0.5, 2.0))
+@drawn(20, st.floats(-3, 3), st.floats(0.5, 2.0))
 def test_a_moved_camera_shows_the_moved_world_as_before(turn: float, scale: float) -> None:
     view = a_view()
     about = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
@@ -118,8 +122,7 @@ def true_walks(scene: Walking) -> list[ViewPlaces]:
     ]
 
 
-@settings(max_examples=3)
-@given(st.floats(-3, 3), st.integers(-8, 8))
+@drawn(9, st.floats(-3, 3), st.integers(-8, 8))
 def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> None:
     a = true_walks(walking(2, 2, 30.0, 0))[0]
     b = ViewPlaces(a.frame + delay, np.exp(1j * turn) * a.place + 2 - 1j)
@@ -160,7 +163,7 @@ def scene() -> Walking:
 
 @pytest.fixture(scope="module")
 def solution(scene: Walking) -> SolvedViews:
-    return calibrate_from_people(NAMES, scene.views, lambda: None)
+    return auto.calibrate_from_people(NAMES, scene.views, lambda: None)
 
 
 NAMES = ["a", "b", "c"]
@@ -203,7 +206,7 @@ def test_the_grid_holds_those_who_walked(solution: SolvedViews) -> None:
 
 def test_a_bare_floor_changes_nothing(scene: Walking, solution: SolvedViews) -> None:
     bare = [np.full((height, width, 3), 120, np.uint8) for width, height in scene.views.sizes]
-    same, marks = sharpen_by_floor(scene.views, solution, bare)
+    same, marks = auto.sharpen_by_floor(scene.views, solution, bare)
     assert marks == 0 and same is solution
 
 
@@ -247,7 +250,7 @@ def test_known_distances_make_the_plan_right(scene: Walking, solution: SolvedVie
 
 
 def judge(places: list[ViewPlaces]) -> None:
-    require_merged(NAMES, places, merge_views(places, align_all(places, 5.0, 10, lambda: None)), 5.0, 10)
+    auto.require_merged(NAMES, places, auto.merge_views(places, auto.align_all(places, 5.0, 10, lambda: None)), 5.0, 10)
 
 
 def test_views_of_the_same_people_are_let_pass(scene: Walking) -> None:
@@ -265,7 +268,7 @@ def test_people_who_stay_and_people_who_are_few_are_named(scene: Walking) -> Non
     still = Endpoints(endpoints.frame, 0 * endpoints.foot + [200, 300], 0 * endpoints.head + [200, 200])
     few = endpoints.of(np.arange(10))
     for wrong, message in ((still, r"^a: .* stay in one place"), (few, r"^a: found 10 isolated people")):
-        refused(SourceError, message, calibrate_from_people, NAMES, changed(scene, 0, wrong).views, lambda: None)
+        refused(SourceError, message, auto.calibrate_from_people, NAMES, changed(scene, 0, wrong).views, lambda: None)
 
 
 def film(path: Path, endpoints: Endpoints, frames: int) -> None:
@@ -299,9 +302,7 @@ def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.Captur
 
 
 @cases()
-def test_wrong_options_are_named(
-    tmp_path: Path, options: dict[str, tuple[str, ...] | str | float], message: str
-) -> None:
+def test_bad_options_are_told(tmp_path: Path, options: dict[str, tuple[str, ...] | str | float], message: str) -> None:
     for name in ("a", "b"):
         film(tmp_path / f"{name}.avi", walking(1, 1, 2.0).views.endpoints[0], 3)
     given = {"frame_rate": 5.0, "source_kind": "masks", **options}
@@ -311,11 +312,8 @@ def test_wrong_options_are_named(
 
 @pytest.mark.parametrize(("frame_rate", "count"), [(5.2, 0), (25.0, 1)])
 def test_another_frame_rate_is_named(tmp_path: Path, frame_rate: float, count: int) -> None:
-    film = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 5.0, (64, 48))
-    for _ in range(5):
-        film.write(np.zeros((48, 64, 3), np.uint8))
-    film.release()
-    notes = frame_rate_notes([tmp_path / "a.avi"], frame_rate)
+    film = write_at_rate(tmp_path / "a.avi", [np.zeros((48, 64, 3), np.uint8)] * 5, 5.0)
+    notes = frame_rate_notes([film], frame_rate)
     assert len(notes) == count and all("has 5 frames per second by its head, not 25" in note for note in notes)
 
 
@@ -323,3 +321,68 @@ def test_videos_need_different_names_and_more_than_one(tmp_path: Path) -> None:
     a, b, rig = (tmp_path / name for name in ("a.avi", "b.avi", "rig.toml"))
     refused(ConfigError, "two or more, with different names", calibrate_auto, a, output=rig, frame_rate=5.0)
     refused(SourceError, "no such file", calibrate_auto, a, b, output=rig, frame_rate=5.0)
+
+
+SPEC = SceneSpec("walking", 2, (6.0, 6.0), 40.0, 5.0, 2, seed=1, distortion=(-0.2, 0.03))
+GRID = Grid((-2.5, 2.5), (-2.5, 2.5))
+
+
+def room(camera: Camera) -> Bytes:
+    return render_room(SPEC, pixel_rays(camera), camera.centre).image
+
+
+@pytest.fixture(scope="module")
+def cameras() -> tuple[Camera, ...]:
+    return build_rig(SPEC).cameras
+
+
+@pytest.fixture(scope="module")
+def marks(cameras: tuple[Camera, ...]) -> Marks:
+    shifted = replace(cameras[1], ground=cameras[1].ground @ np.array([[1, 0, 0.08], [0, 1, -0.05], [0, 0, 1.0]]))
+    return floor_marks([room(camera) for camera in cameras], [cameras[0], shifted], GRID)
+
+
+def test_marks_are_the_same_place_in_both_views(cameras: tuple[Camera, ...], marks: Marks) -> None:
+    places = [camera.back_project(marks.pixel[:, side]) for side, camera in enumerate(cameras)]
+    away = np.linalg.norm(places[0] - places[1], axis=1)
+    assert len(marks) >= 30
+    assert np.median(away) < 0.05 and np.percentile(away, 90) < 0.12
+
+
+def test_marks_lie_where_they_are_said_to(cameras: tuple[Camera, ...], marks: Marks) -> None:
+    assert np.median(np.linalg.norm(cameras[0].back_project(marks.pixel[:, 0]) - marks.ground, axis=1)) < 0.1
+
+
+def test_a_bare_floor_has_no_marks(cameras: tuple[Camera, ...]) -> None:
+    bare = [np.full((camera.size[1], camera.size[0], 3), 120, np.uint8) for camera in cameras]
+    assert len(floor_marks(bare, cameras, GRID)) == 0
+
+
+@pytest.mark.slow
+def test_marks_bring_cameras_nearer_to_the_truth() -> None:
+    scene = walking(2, 2, 12.0, noise=2.0)
+    single_cameras = single_view_cameras(scene.views, lambda: None)
+    places = view_places(scene.views, single_cameras)
+    merged = merge_views(places, align_all(places, 5.0, 0, lambda: None))
+    by_people = refine_cameras(scene.views, placed_views(single_cameras, merged), np.zeros(2, np.int64), lambda: None)
+    true = exact_marks(scene)
+    by_both = refine_with_marks(scene.views, by_people, true)
+    assert disagreement(by_both, true) < 0.5 * disagreement(by_people, true)
+    assert by_both.adjustment.residual.shape == by_people.adjustment.residual.shape
+    assert refine_with_marks(scene.views, by_people, true.of(np.zeros(0, np.int64))) is by_people
+    assert np.isfinite(by_both.adjustment.parameters.views[:, CENTRE]).all()
+
+
+def exact_marks(scene: Walking) -> Marks:
+    ground = np.stack(np.meshgrid(np.linspace(-2, 2, 9), np.linspace(-2, 2, 9)), -1).reshape(-1, 2)
+    pixel = np.stack([camera.project(ground, 0.0)[0] for camera in scene.rig.cameras], 1)
+    visible = np.all([camera.inside(pixel[:, k]) for k, camera in enumerate(scene.rig.cameras)], axis=0)
+    return Marks(np.tile([0, 1], (int(visible.sum()), 1)), pixel[visible], 0 * ground[visible])
+
+
+def disagreement(solution: SolvedViews, marks: Marks) -> float:
+    """Median distance of the two places that the views have a mark at, metres."""
+    places: list[Floats] = [
+        camera.back_project(marks.pixel[:, side]) for side, camera in enumerate(cameras_of(solution, ["a", "b"]))
+    ]
+    return float(np.median(np.linalg.norm(places[0] - places[1], axis=1)))

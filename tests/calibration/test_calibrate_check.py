@@ -283,7 +283,7 @@ def test_clicked_points_give_the_cameras(page: Page, tmp_path: Path) -> None:
     assert len(rows) == 12 and max(row[2] for row in rows) < 0.6 and max(row[3] for row in rows) < 3
     points = tmp_path / "points.csv"
     points.write_text(
-        page.ask("decodeURIComponent(document.getElementById('save').href.split(',').slice(1).join(','))")
+        page.ask("decodeURIComponent(document.querySelector('#save').href.split(',').slice(1).join(','))")
     )
     for table, camera in zip(read_points(points), CAMERAS, strict=True):
         fit = fit_points(table.camera, camera.size, Points(table.pixel, table.place[:, :2], table.place[:, 2]))

@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 import pytest
 from cases import cases
-from hypothesis import given
+from films import write_at_rate
 from recordings import in_ci, track, write_recording
 from refusals import refused
 from scenes import looking, rig_of, walkers
-from strategies import BARREL, Pose, examples, poses
+from strategies import BARREL, Pose, drawn, examples, poses
 
 from stseg import errors
 from stseg.arrays import Bytes, Floats
@@ -79,9 +79,7 @@ class TestFit:
 
     def test_points_above_the_ground_reveal_another_kind_of_camera(self) -> None:
         square = camera()
-        matrix = np.array(
-            [[1.0, 0.0, 90.0], [0.0, 1.3, -60.0], [0.0, 0.0, 1.0]]
-        )  # a crop, and pixels that are not square
+        matrix = np.array([[1.0, 0.0, 90.0], [0.0, 1.3, -60.0], [0.0, 0.0, 1.0]])  # a crop, pixels that are not square
         true = Camera.from_projection("cam", SIZE, matrix @ square.projection)
         found = fit(points_of(true), true)
         assert found.vertical_from == "points" and off(found.camera, true) < 1e-3
@@ -158,7 +156,7 @@ class TestSpread:
 
 
 class TestSquarePixels:
-    @given(poses())
+    @drawn(100, poses())
     def test_focal_length_and_vertical_are_found(self, pose: Pose) -> None:
         matrix = middle_matrix(pose.matrix[0, 0], SIZE)
         projection = matrix @ np.column_stack([pose.rotation, pose.translation])
@@ -306,9 +304,7 @@ DISTORTION = np.array([-0.18, 0.04, 0.0, 0.0, 0.0])
 def board_view(turn: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shift: tuple[float, float, float]) -> Bytes:
     """A board of 8 x 6 squares of 50 pixels of texture, side 1, as the distorted camera sees it."""
     squares = (np.indices((6, 8)).sum(axis=0) % 2 * 255).astype(np.uint8)
-    texture = cv2.copyMakeBorder(
-        np.kron(squares, np.ones((50, 50), np.uint8)), 50, 50, 50, 50, cv2.BORDER_CONSTANT, value=255
-    )
+    texture = np.pad(np.kron(squares, np.ones((50, 50), np.uint8)), 50, constant_values=255)
     pixel = np.stack(np.meshgrid(np.arange(LENS_SIZE[0]), np.arange(LENS_SIZE[1])), -1).reshape(-1, 1, 2).astype(float)
     ray = cv2.undistortPoints(pixel, MATRIX, DISTORTION).reshape(-1, 2)
     rotation = cv2.Rodrigues(turn)[0]
@@ -322,13 +318,11 @@ def board_view(turn: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shift: t
 
 @pytest.fixture(scope="module")
 def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path, rng = tmp_path_factory.mktemp("board") / "board.avi", np.random.default_rng(0)
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"FFV1"), 10.0, LENS_SIZE, True)
+    rng, views = np.random.default_rng(0), []
     for _ in range(18):
         shift = (*(rng.uniform(-1, 1, 2) * [2.5, 1.5]), rng.uniform(11, 17))
-        writer.write(board_view(rng.uniform(-0.55, 0.55, 3), shift))
-    writer.release()
-    return path
+        views.append(board_view(rng.uniform(-0.55, 0.55, 3), shift))
+    return write_at_rate(tmp_path_factory.mktemp("board") / "board.avi", views, 10.0, "FFV1")
 
 
 def test_the_lens_comes_back(video: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Commands, and the demo that the README begins with."""
+"""Commands, what they refuse before they begin, and the demo that the README begins with."""
 
 import io
 import json
@@ -7,19 +7,25 @@ import re
 import subprocess
 import sys
 from contextlib import redirect_stdout
+from html import unescape
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from attacks import RIG, film, write_rig
 from cases import cases
 from recordings import COMMAND, ENVIRONMENT, process
-from refusals import Command
-from run_files import small_recording, small_trajectory, trajectory_of, write_run
+from refusals import Command, refused
+from run_files import small_recording, small_trajectory, trajectory_of, write_empty_run, write_run, write_small_run
 
 import stseg
+from stseg.arrays import Floats
 from stseg.commands.inspect import event_counts_text
 from stseg.commands.main import COMMANDS, main
+from stseg.errors import CalibrationError, OutputError
+from stseg.geometry import Grid, Lens, Rig
+from stseg.geometry.lens import LensModel
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.tasks.overview import summarise_run
@@ -82,8 +88,7 @@ def test_inspect_sums_up_a_run(run_path: Path) -> None:
     overview = summarise_run(read_run(run_path))
     assert (overview.frames, overview.first_frame, overview.last_frame, overview.seconds) == (6, 10, 15, 1.2)
     assert (overview.people_mean, overview.people_most) == (1.5, 2)
-    assert [track["id"] for track in overview.tracks] == [1, 2]
-    assert overview.events == {"birth": 2}
+    assert [track["id"] for track in overview.tracks] == [1, 2] and overview.events == {"birth": 2}
     assert (overview.candidates_per_frame, overview.ghosts_per_frame) == (3 / 6, 1 / 6)
     assert overview.seconds_by_stage == {"cut": 3.0, "volume": 1.0}
     assert list(overview.seconds_by_stage) == ["cut", "volume"]
@@ -116,27 +121,21 @@ def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, stdout: Command)
     texts = ("t=2.2,plane=0.9", "frame=11,plane=0.85", "t=2.4,plane=0.9", "t=2.2,plane=0", "frame=11,plane=all")
     said = [stdout("inspect", run_path, "--slice", text, "-o", tmp_path / f"{k}.png") for k, text in enumerate(texts)]
     pictures = [(tmp_path / f"{k}.png").read_bytes() for k in range(5)]
-    assert pictures[0] == pictures[1]
-    assert len(set(pictures)) == 4
+    assert pictures[0] == pictures[1] and len(set(pictures)) == 4
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
     assert "0.png: frame 11 (2.20 s), 0.90 m" in said[0]
 
 
 @cases()
-def test_a_slice_out_of_range_is_told(
-    run_path: Path, tmp_path: Path, refusal: Command, arguments: list[str], told: str
-) -> None:
+def test_slices_out_of_range(run_path: Path, tmp_path: Path, refusal: Command, arguments: list[str], told: str) -> None:
     assert told in refusal("inspect", run_path, *arguments, "-o", tmp_path / "slice.png")
     assert not (tmp_path / "slice.png").exists()
 
 
-def test_a_slice_needs_a_file_and_destroys_none(run_path: Path, tmp_path: Path, refusal: Command) -> None:
+def test_a_slice_needs_a_file(run_path: Path, tmp_path: Path, refusal: Command) -> None:
     command = ("inspect", run_path, "--slice", "t=2,plane=0")
     assert "-o SLICE.png with it" in refusal(*command)
     refusal("inspect", run_path, "-o", tmp_path / "a.png")
-    (tmp_path / "old.png").write_text("precious")
-    refusal(*command, "-o", tmp_path / "old.png")
-    assert (tmp_path / "old.png").read_text() == "precious"
 
 
 def test_inspect_on_a_screen(run_path: Path, stdout: Command) -> None:
@@ -160,22 +159,7 @@ def test_export_to_pedpy_and_mot(run_path: Path, tmp_path: Path) -> None:
     assert len(lines) == 2 + len(small_trajectory())
     assert main(["export", str(run_path), "--to", "mot", "-o", str(tmp_path / "mot.txt")]) == 0
     lines = (tmp_path / "mot.txt").read_text().splitlines()
-    assert lines[0] == "11,1,-1,-1,-1,-1,1,0.1500,0.2000,0.0000"
-    assert len(lines) == len(small_trajectory())
-
-
-def test_export_destroys_nothing(run_path: Path, tmp_path: Path, refusal: Command) -> None:
-    target = tmp_path / "tracks.csv"
-    target.write_text("precious")
-    command = ["export", str(run_path), "--to", "csv", "-o", str(target)]
-    assert "exists" in refusal(*command)
-    assert "did not make" in refusal(*command, "--overwrite")
-    assert target.read_text() == "precious"
-    target.unlink()
-    assert main(command) == main([*command, "--overwrite"]) == 0
-    assert target.read_text().startswith("frame,id,x,y")
-    assert "a file that is read here" in refusal("export", run_path, "--to", "csv", "-o", run_path, "--overwrite")
-    assert len(read_run(run_path).frames) == 6
+    assert lines[0] == "11,1,-1,-1,-1,-1,1,0.1500,0.2000,0.0000" and len(lines) == len(small_trajectory())
 
 
 def test_evaluate_takes_a_run_file(run_path: Path, tmp_path: Path, stdout: Command) -> None:
@@ -229,8 +213,7 @@ def test_pictures_and_page_are_there(demo: Demo) -> None:
 def test_it_scores_and_names_what_to_open(demo: Demo) -> None:
     assert re.search(r"MODA \d+\.\d %", demo.said)
     listed = re.findall(r"^  (\S+) ", demo.said.partition("\nOpen\n")[2], re.MULTILINE)
-    assert str(demo.folder / "report.html") in listed
-    assert all(Path(name).is_file() for name in listed)
+    assert str(demo.folder / "report.html") in listed and all(Path(name).is_file() for name in listed)
 
 
 def test_a_folder_with_files_in_it_is_left_alone(tmp_path: Path, refusal: Command) -> None:
@@ -259,3 +242,62 @@ def test_tables_are_whole_in_a_pipe(run_path: Path, stdout: Command, monkeypatch
 def test_an_option_that_was_left_out_is_missing(refusal: Command) -> None:
     assert "command line: -o: found nothing, expected it; see stseg run --help" in refusal("run", "rig.toml")
     assert "requires an argument" in refusal("run", "rig.toml", "-o")
+
+
+POINTS = "camera,u,v,x,y\ncam1,10,40,0,0\ncam1,50,40,1,0\ncam1,30,30,0,1\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the command is called: a rig, a run, an empty run, a film and points."""
+    (tmp_path / "other").mkdir()
+    write_rig(tmp_path)
+    write_rig(tmp_path / "other", "cam1", "cam9")
+    write_small_run(tmp_path / "run.h5")
+    write_empty_run(tmp_path / "other" / "empty.h5")
+    for name in ("film.avi", "b.avi"):
+        film(tmp_path / name, tmp_path / "plain.avi")
+    (tmp_path / "points.csv").write_text(POINTS)
+    (tmp_path / "cam1.xml").write_text("<!-- made by stseg -->")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@cases()
+def test_options_are_refused(folder: Path, words: str, message: str, refusal: Command) -> None:
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert message in refusal(*words.split())
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+def test_pages_and_their_commands_hold_names_as_text(folder: Path) -> None:
+    """Names of files are quoted for a shell, names of cameras for HTML; no page replaces what it shows."""
+    (folder / "film.avi").rename(folder / "a film.avi")
+    assert main(["calibrate", "page", "a film.avi", "--area", "0, 0,1,1", "-o", "page.html"]) == 0
+    text = unescape((folder / "page.html").read_text())
+    assert "'--area=0, 0,1,1'" in text and "--sources 'a film.avi'" in text
+    write_rig(folder, 'name = "yard"', "name = '<b>'")
+    with (folder / "rig.toml").open("a") as rig:
+        rig.write(RIG[RIG.index("[[camera]]") :].replace("cam1", "<i>"))
+    found = stseg.check_rig("rig.toml")
+    found.write_page(Path("check.html"))
+    text = (folder / "check.html").read_text()
+    assert "&lt;b&gt;" in text and "&lt;i&gt;" in text and "<b>" not in text and "<i>" not in text
+    refused(OutputError, "a file that is read", found.write_page, Path("boxes.csv"), overwrite=True)
+
+
+@pytest.mark.parametrize(
+    ("ground", "vertical", "message"),
+    [
+        (np.zeros((1, 3, 3)), np.zeros((2, 3)), r"found arrays of \(1, 3, 3\) and \(2, 3\) for 2 cameras"),
+        (np.zeros((2, 3, 3)), np.zeros((2, 4)), r"found arrays of \(2, 3, 3\) and \(2, 4\) for 2 cameras"),
+    ],
+)
+def test_arrays_of_rigs_are_refused(ground: Floats, vertical: Floats, message: str) -> None:
+    sizes, grid = [(64, 48)] * 2, Grid((0, 1), (0, 1))
+    refused(CalibrationError, message, Rig.from_homographies, ground, vertical, sizes, grid, 5.0)
+
+
+@cases()
+def test_lenses_are_refused(model: LensModel, focal: float, distortion: list[float], message: str) -> None:
+    refused(CalibrationError, message, Lens, np.diag([focal, focal, 1.0]), np.array(distortion), model)

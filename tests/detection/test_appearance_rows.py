@@ -74,8 +74,7 @@ def assert_worn(rows: Rows) -> None:
 
 def test_colours_are_those_that_each_person_wears() -> None:
     rows = rows_of(*painted())
-    assert set(rows["frame"].tolist()) == {7}
-    assert sorted(set(rows["view"].tolist())) == [0, 1, 2, 3]
+    assert set(rows["frame"].tolist()) == {7} and sorted(set(rows["view"].tolist())) == [0, 1, 2, 3]
     assert_worn(rows)
     assert np.isnan(rows["features"]).all()
 
@@ -83,8 +82,7 @@ def test_colours_are_those_that_each_person_wears() -> None:
 def test_a_camera_of_another_gain_differs_by_one_offset() -> None:
     bright, dark = rows_of(*painted()), rows_of(*painted(0.6))
     offset = (bright["colours"] - dark["colours"]).astype(float)
-    assert np.ptp(offset) < 0.25
-    assert abs(offset.mean() - np.log(1 / 0.6)) < 0.2
+    assert np.ptp(offset) < 0.25 and abs(offset.mean() - np.log(1 / 0.6)) < 0.2
 
 
 def test_a_person_whom_others_cover_has_no_looks() -> None:
@@ -106,12 +104,10 @@ def test_features_of_boxes_go_to_the_people_whose_boxes_they_are() -> None:
     assert len(rows) == 8
     for (x, _, _), features in zip(STANDING, ([1, 2], [4, 5]), strict=True):
         of_person = rows["features"][rows["x"] == x]
-        assert (of_person[:, :2] == features).all()
-        assert (of_person[:, 2:] == 0).all()
+        assert (of_person[:, :2] == features).all() and (of_person[:, 2:] == 0).all()
     assert np.isnan(rows["colours"]).all()
     assert not len(rows_of([None] * 4, likely))
-    assert rows["features"].shape[1] == FEATURES
-    assert rows["colours"].shape[1] == COLOURS
+    assert rows["features"].shape[1] == FEATURES and rows["colours"].shape[1] == COLOURS
 
 
 def test_colours_beside_boxes_are_those_of_their_middles() -> None:
@@ -189,8 +185,7 @@ def test_axes_are_those_of_the_greatest_variance() -> None:
     axes = principal_axes(samples, FEATURES)
     assert axes.shape == (40, FEATURES)
     np.testing.assert_allclose(axes.T @ axes, np.eye(FEATURES), atol=1e-9)
-    assert axes[3, 0] > 0.99
-    assert axes[17, 1] > 0.99
+    assert axes[3, 0] > 0.99 and axes[17, 1] > 0.99
 
 
 def test_cameras_whose_features_differ_in_length_are_refused(tmp_path: Path) -> None:
@@ -201,7 +196,6 @@ def test_cameras_whose_features_differ_in_length_are_refused(tmp_path: Path) -> 
         sources.append(CameraSource(source(folder, np.arange(8.0 + 4 * (k == 3)).reshape(4, -1))))
     three = Recording(tmp_path / "rig.toml", RIG, (*sources[:3], CameraSource(Source("masks", tmp_path / "m.avi"))))
     axes = appearance_axes(three)
-    assert axes is not None
-    assert axes.shape == (2, 2)
+    assert axes is not None and axes.shape == (2, 2)
     refused(FormatError, "3 numbers a box", appearance_axes, Recording(tmp_path / "rig.toml", RIG, tuple(sources)))
     assert appearance_axes(Recording(tmp_path / "rig.toml", RIG, three.sources[3:] * 4)) is None

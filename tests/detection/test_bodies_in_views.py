@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import example, given
+from hypothesis import example
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, likelihoods, looking, people, rig_of, room
-from strategies import numbers
+from strategies import drawn, numbers
 
 import stseg
 from stseg.arrays import Flags, Floats, Singles
@@ -33,7 +33,7 @@ EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(
 )
 
 
-@given(EDGES, EDGES)
+@drawn(100, EDGES, EDGES)
 def test_half_square_by_definition(body: Floats, box: Floats) -> None:
     expected = reference.half_square(body, box, TOLERANCE, WIDTH, HEIGHT)
     assert half_square(body, box, TOLERANCE, WIDTH, HEIGHT) == pytest.approx(expected, rel=1e-9)
@@ -47,7 +47,7 @@ def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
     assert late_cost == pytest.approx(16 * early_cost)
 
 
-@given(st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.lists(EDGES, max_size=3), st.integers(0, 99))
+@drawn(100, st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.lists(EDGES, max_size=3), st.integers(0, 99))
 @example(np.array([[0.0, 0.0, 1.0, 2.0], [0.0, 5.0, 1.0, 16.0]]), [np.array([0.0, 0.0, 1.0, 40.0])], 0)  # far too tall
 def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
@@ -71,7 +71,7 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
     np.testing.assert_array_equal(best, np.where(expected > -30.0, expected, -np.inf))
 
 
-@given(st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.integers(0, 99))
+@drawn(100, st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.integers(0, 99))
 def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     distance = np.random.default_rng(seed).uniform(2, 3, len(bodies))
@@ -107,7 +107,7 @@ def test_an_outline_is_the_silhouette(step: int) -> None:
         assert area[j] == pytest.approx(silhouette.sum(), rel=0.15)
 
 
-@given(st.integers(0, 99), st.sampled_from([1, 3]))
+@drawn(100, st.integers(0, 99), st.sampled_from([1, 3]))
 def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
     chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
     ground, heights = chance.uniform(-3, 3, (2, 3, 2)), chance.uniform(1.4, 2, (2, 3))

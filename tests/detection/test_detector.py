@@ -50,8 +50,7 @@ def test_two_people_apart(kind: str) -> None:
     index = assert_found(explanation, standing)
     found = explanation.people
     np.testing.assert_allclose(found.height[index], standing[:, 2], atol=0.11)
-    assert (found.evidence > 5).all()
-    assert (found.view_evidence > 0.5).all()
+    assert (found.evidence > 5).all() and (found.view_evidence > 0.5).all()
     assert found.view_evidence.shape == found.visibility.shape == (4, 2)
     spread = np.linalg.eigvalsh(found.covariance)
     assert ((spread > 0) & (spread < 0.15**2)).all()
@@ -86,8 +85,7 @@ def test_pixels_and_boxes_are_assigned_to_people(kind: str) -> None:
     pixel, _ = rig.cameras[0].project(points[::20, :2], points[::20, 2])
     u, v = np.rint(pixel / explanation.raster_step[0]).astype(int).T
     owner = explanation.pixel_assignment[0][v, u]
-    assert (owner == nearest).mean() > 0.8
-    assert not (owner == far).any()
+    assert (owner == nearest).mean() > 0.8 and not (owner == far).any()
     assert set(np.unique(explanation.pixel_assignment[2]).tolist()) == {-1, 0, 1}
     for owners in explanation.box_assignment:
         assert sorted(owners.tolist()) == ([nearest, far] if nearest < far else [far, nearest]) * (kind == "boxes")
@@ -117,31 +115,26 @@ def test_a_person_hidden_from_all_but_two_views_stays(kind: str) -> None:
     views = evidence_of(kind, rig.cameras, standing)
     if kind == "boxes":
         views[:2] = [boxes(camera, nearer) for camera in rig.cameras[:2]]
-    explanation = room_detector(kind).explain(views, None)
-    assert_found(explanation, standing, within=0.2)
+    assert_found(room_detector(kind).explain(views, None), standing, within=0.2)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_empty_frame_has_no_people(kind: str) -> None:
     views = evidence_of(kind, room().cameras, people())
     explanation = room_detector(kind).explain(views, None)
-    assert len(explanation.people) == 0
-    assert len(explanation.ghosts) == 0
+    assert len(explanation.people) == 0 and len(explanation.ghosts) == 0
     assert all((owner == -1).all() for owner in explanation.pixel_assignment)
     # A track of the frame before is rejected, too.
     explanation = room_detector(kind).explain(views, expecting((0.2, 0.4)))
-    assert len(explanation.people) == 0
-    assert len(explanation.ghosts) == 1
-    assert explanation.ghosts.evidence[0] < 0
-    assert explanation.people.view_evidence.shape == (4, 0)
+    assert len(explanation.people) == 0 and len(explanation.ghosts) == 1
+    assert explanation.ghosts.evidence[0] < 0 and explanation.people.view_evidence.shape == (4, 0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_track_proposes_and_the_frame_decides(kind: str) -> None:
     standing = people((0.2, 0.4))
     views = evidence_of(kind, room().cameras, standing)
-    explanation = room_detector(kind).explain(views, expecting((0.25, 0.35), (-1.2, 1.1)))
-    assert_found(explanation, standing)
+    assert_found(room_detector(kind).explain(views, expecting((0.25, 0.35), (-1.2, 1.1))), standing)
 
 
 def only(explanation: Explanation) -> tuple[float, float, int]:

@@ -56,8 +56,7 @@ def assert_these(explanation: Explanation, standing: Floats, ghosts: int = 0) ->
     found = explanation.people.ground
     who, _ = assign(distances(standing[:, :2], found), 0.25)
     assert len(who) == len(standing) == len(found), found
-    assert len(explanation.ghosts) >= ghosts
-    assert (explanation.ghosts.evidence < 0).all()
+    assert len(explanation.ghosts) >= ghosts and (explanation.ghosts.evidence < 0).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -80,8 +79,7 @@ def test_five_people(kind: str, cameras: int, scene: int) -> None:
     """At once in a first frame without tracks, and again with their tracks."""
     standing, frame_pass = FIVE[scene], pass_of(kind, cameras)
     views = evidence_of(kind, corner_cameras()[:cameras], standing)
-    first = frame_pass.explain(views, None)
-    assert_these(first, standing, GHOSTS.get((kind, cameras), 0))
+    assert_these(frame_pass.explain(views, None), standing, GHOSTS.get((kind, cameras), 0))
     assert_these(frame_pass.explain(views, expecting(*standing + np.array([0.06, -0.05, 0]))), standing)
 
 
@@ -127,8 +125,7 @@ def test_a_ghost_that_moves_with_its_makers(kind: str) -> None:
     """However long it is borne out, it never becomes a track."""
     run = moving_ghosts(kind)
     rows = run.tracks.trajectory
-    assert np.unique(rows["id"]).tolist() == [1, 2]
-    assert len(rows) == 2 * FRAMES
+    assert np.unique(rows["id"]).tolist() == [1, 2] and len(rows) == 2 * FRAMES
     for row in rows:
         away = np.hypot(*(strollers(row["frame"])[:, :2] - [row["x"], row["y"]]).T)
         assert away.min() < 0.3
@@ -242,8 +239,7 @@ def test_scores_by_definition_where_they_matter(seed: int, minimum_probe_score: 
     is_evaluated = np.isfinite(found)
     np.testing.assert_allclose(found[is_evaluated], expected[is_evaluated], atol=1e-9)
     worth, matters = expected[1] > minimum_probe_score, (expected > 0).any(0)
-    assert is_evaluated[1, worth & matters].all()
-    assert is_evaluated[:, worth][expected[:, worth] > 0].all()
+    assert is_evaluated[1, worth & matters].all() and is_evaluated[:, worth][expected[:, worth] > 0].all()
     assert not is_evaluated[::2, ~worth].any()
     assert matters.any()
     assert is_evaluated.any(0).mean() < 1.0
@@ -258,5 +254,4 @@ def test_whatever_is_shown_is_noticed() -> None:
     bright[0, row, column] = 1
     explained[row * LATTICE.shapes[0, 1] + column] = 0
     for score in (scores(bright, no_owner, -np.inf)[1], scores(nothing(), explained, -np.inf)[1]):
-        assert 0 < (score != silent).sum() < score.size / 2
-        assert (score >= silent).all()
+        assert 0 < (score != silent).sum() < score.size / 2 and (score >= silent).all()

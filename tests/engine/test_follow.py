@@ -105,9 +105,7 @@ def test_tracks_are_written_window_by_window_under_lasting_ids(live: Path) -> No
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
 
 
-def test_ids_that_are_corrected_go_on_so_and_are_written(
-    rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_corrected_ids_are_written(rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As if two had been exchanged from frame 4 on, which is decided with some frame after 20."""
     assert live.exists()
     decided = list[int]()
@@ -153,8 +151,7 @@ def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) 
     assert messages.splitlines()[-1] == "stseg: finishing; once more to stop at once"
     assert re.search(r"run.h5: 3 tracks in frames 0 to \d+, published \d+.\d s after arrival", reported)
     stop = int(read_run(output).frames[-1]) + 1
-    assert stop > 9
-    assert track(rig, tmp_path / "afterwards.h5", "--frames", f"0:{stop}") == 0
+    assert stop > 9 and track(rig, tmp_path / "afterwards.h5", "--frames", f"0:{stop}") == 0
     assert_same(output, tmp_path / "afterwards.h5")
     assert len({line.split(",")[0] for line in lines(output)[1:]}) == stop
 
@@ -169,8 +166,7 @@ def test_a_run_to_which_nothing_came_leaves_nothing(tmp_path: Path) -> None:
     running.terminate()
     reported, messages = running.communicate(timeout=60)
     assert (running.returncode, messages) == (0, "stseg: finishing; once more to stop at once\n")
-    assert reported == f"{output}: not written, since nothing came\n"
-    assert list(output.parent.iterdir()) == []
+    assert reported == f"{output}: not written, since nothing came\n" and list(output.parent.iterdir()) == []
 
 
 @pytest.mark.slow
@@ -204,9 +200,7 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
     assert (evaluate(walkers(FRAMES), messages).switches, len(messages)) == (0, 3 * FRAMES)
 
 
-def test_a_kill_before_its_folder_is_removed_is_mended(
-    rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_kill_at_the_end_is_mended(rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = (rig, tmp_path / "run.h5", "--follow", "--frames", f"0:{FRAMES}")
     with monkeypatch.context() as patch:
         patch.setattr(WorkFolder, "remove", Mock(side_effect=OSError(5, "killed")))
@@ -224,8 +218,7 @@ def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.
     assert "no empty scene of west, east, north: learning from 5 s before the run begins" in capsys.readouterr().err
     run = read_run(output)
     assert run.frames.tolist() == list(range(FRAMES))
-    scores = evaluate(walkers(FRAMES), run.trajectory)
-    assert scores.misses < 0.1 * 3 * FRAMES
+    assert evaluate(walkers(FRAMES), run.trajectory).misses < 0.1 * 3 * FRAMES
 
 
 @pytest.fixture(scope="module")
@@ -298,9 +291,7 @@ def server(cameras_rig: Path) -> Iterator[dict[str, str]]:
 
 
 @pytest.mark.slow
-def test_a_real_rtsp_server_whose_streams_end_is_followed(
-    cameras_rig: Path, server: dict[str, str], tmp_path: Path
-) -> None:
+def test_an_rtsp_server_that_ends_is_followed(cameras_rig: Path, server: dict[str, str], tmp_path: Path) -> None:
     rig = _as_live(cameras_rig.with_name("rig.toml"), cameras_rig.with_name("served.toml"), server)
     running = process(rig, tmp_path / "run.h5", "--set", "segments.length=5", "--set", "live.stream_timeout=3")
     wait_for_frame(tmp_path / "run.h5", 100, running)
@@ -311,8 +302,7 @@ def test_a_real_rtsp_server_whose_streams_end_is_followed(
     back, lost = messages.count("the stream is back"), messages.count("no pictures from")
     assert 3 <= back <= lost <= back + 3
     run = read_run(tmp_path / "run.h5")
-    assert run.frames.tolist() == list(range(run.frames[-1] + 1))
-    assert len(run.tracks) >= 3
+    assert run.frames.tolist() == list(range(run.frames[-1] + 1)) and len(run.tracks) >= 3
 
 
 def test_where_it_ends_by_itself() -> None:

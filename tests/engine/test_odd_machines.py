@@ -52,8 +52,7 @@ def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFix
     for to in ("csv", "parquet", "sqlite"):
         assert main(["export", run, "--to", to, "-o", f"{run}.{to}"]) == 0
     assert main(["export", run, "--to", "sqlite", "-o", str(tmp_path / "archive.sqlite")]) == 0
-    assert main(["inspect", run]) == 0
-    assert main(["report", run, "-o", f"{run}.html"]) == 0
+    assert main(["inspect", run]) == 0 and main(["report", run, "-o", f"{run}.html"]) == 0
     assert main(["export", run, "--to", "duckdb", "-o", f"{run}.duckdb"]) == 2
     assert capsys.readouterr().err.splitlines() == [
         f"stseg: error: {printable(run)}.duckdb: found a path that is no UTF-8, expected one that is, for DuckDB"
@@ -61,9 +60,7 @@ def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize("code", [errno.ENOLCK, *in_ci(errno.ENOSYS)])
-def test_a_file_system_without_locks_serves(
-    rig_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
-) -> None:
+def test_no_locks_are_no_harm(rig_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
     assert track(rig_path, tmp_path / "locked.h5", "--frames", "0:8") == 0
     opened = h5py.File.__init__
 

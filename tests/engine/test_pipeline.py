@@ -100,8 +100,7 @@ def test_three_walkers_are_three_tracks(kind: str, tracker: str) -> None:
     truth = TRUTH[TRUTH["frame"] < frames]
     scores = evaluate(truth, done.tracks.trajectory)
     assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
-    assert scores.location_mean is not None
-    assert scores.location_mean < (0.05 if kind == "pixels" else 0.1)
+    assert scores.location_mean is not None and scores.location_mean < (0.05 if kind == "pixels" else 0.1)
     summary = done.tracks.summary()
     assert (summary["frames"] == frames).all()
     assert sorted(np.round(summary["height"], 1)) == pytest.approx([1.6, 1.7, 1.8], abs=0.11)
@@ -110,8 +109,7 @@ def test_three_walkers_are_three_tracks(kind: str, tracker: str) -> None:
         places = truth[truth["frame"] == t]
         occupied = RIG.grid.ground[(label > 0).any(0)]
         away = np.hypot(occupied[:, 0, None] - places["x"], occupied[:, 1, None] - places["y"])
-        assert away.min(1).max() < 0.6
-        assert (away.min(0) < 0.3).all()
+        assert away.min(1).max() < 0.6 and (away.min(0) < 0.3).all()
 
 
 def test_boxes_of_the_tracks_are_those_of_the_people() -> None:
@@ -130,8 +128,7 @@ def test_boxes_of_the_tracks_are_those_of_the_people() -> None:
 def test_every_frame_has_its_candidates() -> None:
     done = whole("boxes", "cut")
     for step in done.steps:
-        assert step.candidates.dtype == CANDIDATE
-        assert step.parts.shape == (len(step.candidates), 4)
+        assert step.candidates.dtype == CANDIDATE and step.parts.shape == (len(step.candidates), 4)
         assert step.timings.dtype == TIMING
         for scene in step.commit.frames:
             own = step.candidates[step.candidates["frame"] == scene.frame]
@@ -154,8 +151,7 @@ def test_every_window_has_its_rates() -> None:
         assert step.rates["view"].tolist() == [0, 1, 2, 3]
     # A perfect detector: it misses less than was guessed, and people's surroundings are told apart from the rest.
     first, last = done.steps[0].rates, done.steps[-1].rates
-    assert (last["miss"] < first["miss"]).all()
-    assert (last["person_clutter"] > last["clutter"]).all()
+    assert (last["miss"] < first["miss"]).all() and (last["person_clutter"] > last["clutter"]).all()
 
 
 @pytest.mark.parametrize("tracker", ["cut", "frames"])
@@ -208,8 +204,7 @@ def test_short_recordings(frames: int) -> None:
     shortest = round(CONFIG.tracking.minimum_duration * RIG.frame_rate)
     assert len(done.tracks.trajectory) == (3 * frames if frames >= shortest else 0)
     kinds = done.tracks.events["kind"].tolist()
-    assert kinds.count(b"birth") == 3
-    assert kinds.count(b"dropped") == (0 if frames >= shortest else 3)
+    assert kinds.count(b"birth") == 3 and kinds.count(b"dropped") == (0 if frames >= shortest else 3)
     assert (done.identity == (done.trajectory["id"] if frames >= shortest else 0)).all()
 
 
@@ -258,8 +253,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_run_keeps_the_colours_of_people(scene: Path, tmp_path: Path) -> None:
     run = stseg.track(scene / "beside.toml", tmp_path / "run.h5", volume="none")
     colours = run.appearance["colours"]
-    assert len(colours) > 2 * IMAGE_FRAMES
-    assert np.isfinite(colours).all()
+    assert len(colours) > 2 * IMAGE_FRAMES and np.isfinite(colours).all()
     assert {"images"} <= {name.decode() for name in run.provenance.sources["role"]}
 
 
@@ -267,6 +261,5 @@ def test_frames_that_nobody_wants_are_not_read(scene: Path, tmp_path: Path) -> N
     gone = tmp_path / "gone.toml"
     text = (scene / "beside.toml").read_text().replace('path = "cam', f'path = "{scene}/cam')
     gone.write_text(re.sub(r'images = .*"', f'images = {{ kind = "video", path = "{tmp_path}/none.avi"', text))
-    run = stseg.track(gone, tmp_path / "run.h5", config=NOTHING, volume="none")
-    assert not len(run.appearance)
+    assert not len(stseg.track(gone, tmp_path / "run.h5", config=NOTHING, volume="none").appearance)
     refused(SourceError, r"none\.avi", stseg.track, gone, tmp_path / "other.h5", volume="none")

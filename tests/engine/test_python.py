@@ -62,8 +62,7 @@ def test_a_crowd_that_is_searched_in_part_is_named(monkeypatch: pytest.MonkeyPat
     crowds = events[events["kind"] == b"crowd"]
     assert crowds["frame"].tolist() == [0, 1]
     number = int(crowds["reason"][0].split()[0])
-    assert number > 0
-    assert f"in 2 frames, first in frame 0: {number} candidates" in crowd_warnings(events)[0]
+    assert number > 0 and f"in 2 frames, first in frame 0: {number} candidates" in crowd_warnings(events)[0]
     assert crowd_warnings(events[:0]) == []
 
 
@@ -201,8 +200,7 @@ def test_a_notebook_shows_the_plan_and_plays_the_film(tmp_path: Path) -> None:
     film = run.film(tmp_path / "run.mp4", frames=(10, 12))
     assert cv2.VideoCapture(str(film.path)).get(cv2.CAP_PROP_FRAME_COUNT) == 2
     assert film._repr_html_().startswith("<video")
-    with pytest.raises(OutputError, match=r"run.mp4: found a file"):
-        run.film(tmp_path / "run.mp4")
+    refused(OutputError, r"run.mp4: found a file", run.film, tmp_path / "run.mp4")
 
 
 def test_every_public_name_is_there_and_no_other() -> None:
@@ -244,8 +242,7 @@ def instances(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
 def test_a_public_object_shows_itself_in_ten_lines(name: str, instances: dict[str, object]) -> None:
     public = getattr(stseg, name)
     shown = repr(instances[name] if isinstance(public, type) else public)
-    assert shown.count("\n") < 10
-    assert len(shown) < 600
+    assert shown.count("\n") < 10 and len(shown) < 600
     assert not shown.startswith("<stseg")
 
 

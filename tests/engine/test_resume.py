@@ -16,12 +16,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from cases import cases
-from hypothesis import example, given, settings
+from hypothesis import example
 from hypothesis.strategies import integers, sampled_from
 from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, in_ci, process, run_words, started, track
 from refusals import Command
 from scenes import walkers
-from strategies import examples
+from strategies import drawn
 
 from stseg.config import Config
 from stseg.evaluation import evaluate
@@ -101,18 +101,14 @@ print(kills)
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), *in_ci((signal.SIGTERM, 143))])
-def test_a_signal_ends_a_run_cleanly(
-    rig_path: Path, undisturbed: Path, night: Path, number: signal.Signals, status: int
-) -> None:
+def test_signals_end_a_run(rig_path: Path, undisturbed: Path, night: Path, number: signal.Signals, status: int) -> None:
     running = run_until(rig_path, night, 2)
     running.send_signal(number)
     _, messages = running.communicate(timeout=60)
     assert running.returncode == status
-    assert "the same command goes on from there" in messages
-    assert "Traceback" not in messages
+    assert "the same command goes on from there" in messages and "Traceback" not in messages
     kept = segments_of(night)
-    assert kept
-    assert not list(kept[0].parent.glob("*.part"))
+    assert kept and not list(kept[0].parent.glob("*.part"))
     assert track(rig_path, night) == 0
     assert_same(night, undisturbed)
 
@@ -144,8 +140,7 @@ def test_a_flipped_byte_is_noticed_and_its_segment_made_anew(
     second.write_bytes(content)
     assert track(rig_path, halfway) == 0
     messages = capsys.readouterr().err
-    assert second.name in messages
-    assert first.name not in messages
+    assert second.name in messages and first.name not in messages
     assert_same(halfway, undisturbed)
 
 
@@ -222,8 +217,7 @@ def configuration_changed(_folder: Path, chance: random.Random) -> tuple[str, ..
 CHANGES = (cameras_reordered, rig_changed, source_changed, sources_exchanged, configuration_changed)
 
 
-@settings(max_examples=examples(20), deadline=None)
-@given(change=sampled_from(CHANGES), seed=integers(0, 10**6))
+@drawn(20, change=sampled_from(CHANGES), seed=integers(0, 10**6))
 @example(change=cameras_reordered, seed=1)
 def test_a_resumed_run_is_the_run_or_is_refused(
     rig_path: Path, killed: Path, change: Callable[[Path, random.Random], tuple[str, ...]], seed: int
@@ -253,7 +247,7 @@ def test_a_rig_in_other_words_goes_on(rig_path: Path, undisturbed: Path, halfway
     assert_same(halfway, undisturbed)
 
 
-def test_another_version_is_refused(
+def test_other_versions_are_refused(
     rig_path: Path, halfway: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stseg.io.runfile.provenance.__version__", "0.0")
@@ -272,17 +266,14 @@ def test_changed_sources_are_refused(rig_path: Path, halfway: Path, refusal: Com
     assert track(rig_path, halfway) == 0
 
 
-def test_a_source_that_vanishes_loses_no_segment(
-    rig_path: Path, undisturbed: Path, halfway: Path, refusal: Command
-) -> None:
+def test_a_vanished_source_loses_no_segment(rig_path: Path, undisturbed: Path, halfway: Path, refusal: Command) -> None:
     source, away = rig_path.parent / "east.csv", rig_path.parent / "away.csv"
     source.rename(away)
     try:
         assert "east.csv" in refusal(*run_words(rig_path, halfway))
     finally:
         away.rename(source)
-    assert len(segments_of(halfway)) >= 3
-    assert track(rig_path, halfway) == 0
+    assert len(segments_of(halfway)) >= 3 and track(rig_path, halfway) == 0
     assert_same(halfway, undisturbed)
 
 
@@ -309,13 +300,10 @@ def test_a_full_disk_loses_no_segment(
         pytest.skip("needs leave to mount a small disk")
     try:
         assert track(rig_path, disk / "night.h5") == 2
-        messages = capsys.readouterr().err
-        assert "No space left on device" in messages
+        assert "No space left on device" in capsys.readouterr().err
         kept = segments_of(disk / "night.h5")
-        assert kept
-        assert all(checksum(path) in path.name for path in kept)
-        assert _mount(disk, "40m,remount")
-        assert track(rig_path, disk / "night.h5") == 0
+        assert kept and all(checksum(path) in path.name for path in kept)
+        assert _mount(disk, "40m,remount") and track(rig_path, disk / "night.h5") == 0
         assert_same(disk / "night.h5", undisturbed)
     finally:
         subprocess.run(["umount", str(disk)], check=False)
@@ -336,8 +324,7 @@ def test_the_volume_is_kept_where_it_is_asked_for(
 ) -> None:
     assert track(rig_path, night, "--volume", volume) == 0
     run, whole = read_run(night), read_run(undisturbed)
-    assert run.kept == volume
-    assert run.trajectory.tobytes() == whole.trajectory.tobytes()
+    assert run.kept == volume and run.trajectory.tobytes() == whole.trajectory.tobytes()
     missing = 0.0
     for frame in run.frames.tolist():
         log_odds, label = run.read_frame(frame)

@@ -106,12 +106,9 @@ def test_workers_that_cannot_be_started(
     def ends(path: str) -> None:
         raise EOFError(path)  # as where the process that forks them has died
 
+    assert "--workers: found 0" in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "0"))
     monkeypatch.setattr(forkserver, "connect_to_new_process", ends)
     assert "no process that can be started" in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "2"))
-
-
-def test_no_workers_are_refused(rig_path: Path, tmp_path: Path, refusal: Command) -> None:
-    assert "--workers: found 0" in refusal(*run_words(rig_path, tmp_path / "run.h5", "--workers", "0"))
 
 
 def test_a_script_that_a_worker_runs_starts_none(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,9 +124,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 
 @pytest.mark.slow
-def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
-    rig_path: Path, undisturbed: Path, tmp_path: Path, cluster: Cluster
-) -> None:
+def test_a_worker_is_killed_in_a_cluster(rig_path: Path, undisturbed: Path, tmp_path: Path, cluster: Cluster) -> None:
     output = tmp_path / "run.h5"
     folder = tmp_path / "run.h5.segments"
 
@@ -143,12 +138,11 @@ def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
 
     with beside(kill):
         assert track(rig_path, output, "--scheduler", cluster.address) == 0
-    assert cluster.workers[0].wait() == -signal.SIGKILL
-    assert cluster.workers[1].poll() is None
+    assert cluster.workers[0].wait() == -signal.SIGKILL and cluster.workers[1].poll() is None
     assert_same(output, undisturbed)
 
 
-def test_a_scheduler_that_is_not_there(
+def test_no_scheduler_is_there(
     rig_path: Path, tmp_path: Path, refusal: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     client: Any = distributed.Client

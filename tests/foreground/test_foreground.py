@@ -7,14 +7,14 @@ import cv2
 import numpy as np
 import pytest
 import reference_foreground as reference
-from hypothesis import example, given, settings
+from hypothesis import example
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from recordings import data_path
 from reference_foreground import FLOOR, SHIRT, near_modes, noisy, random_modes
 from refusals import refused
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Boxes, Bytes, Floats
 from stseg.config import ChromaticConfig
@@ -123,10 +123,8 @@ def test_the_gain_holds_where_people_cover_more_than_half() -> None:
     background = rng.integers(50, 150, (40, 40, 3)).astype(np.float32)
     image = np.round(background * 1.3).astype(np.uint8)
     image[:24] = rng.integers(0, 256, (24, 40, 3))
-    gains = channel_gains(image, background)
-    np.testing.assert_allclose(gains, 1.3, rtol=0.01)
-    dark = channel_gains(np.zeros_like(image), background)
-    np.testing.assert_array_equal(dark, 1)
+    np.testing.assert_allclose(channel_gains(image, background), 1.3, rtol=0.01)
+    np.testing.assert_array_equal(channel_gains(np.zeros_like(image), background), 1)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -146,8 +144,7 @@ def test_gains_are_the_centroids_of_the_peaks_of_histograms(seed: int) -> None:
 GAUSSIAN_MODELS = st.sampled_from([MixtureConfig(), ChromaticConfig()])
 
 
-@settings(max_examples=examples(60))
-@given(seed=st.integers(0, 10**6), modes=st.integers(1, 4), config=GAUSSIAN_MODELS)
+@drawn(60, seed=st.integers(0, 10**6), modes=st.integers(1, 4), config=GAUSSIAN_MODELS)
 def test_log_odds_are_their_formula(seed: int, modes: int, config: reference.GaussianConfig) -> None:
     rng = np.random.default_rng(seed)
     state = random_modes(rng, modes, config)
@@ -158,8 +155,7 @@ def test_log_odds_are_their_formula(seed: int, modes: int, config: reference.Gau
     np.testing.assert_allclose(log_odds, expected, atol=2e-3)
 
 
-@settings(max_examples=examples(60))
-@given(seed=st.integers(0, 10**6), modes=st.integers(1, 4), config=GAUSSIAN_MODELS)
+@drawn(60, seed=st.integers(0, 10**6), modes=st.integers(1, 4), config=GAUSSIAN_MODELS)
 def test_modes_learn_by_their_rules(seed: int, modes: int, config: reference.GaussianConfig) -> None:
     rng = np.random.default_rng(seed)
     state = random_modes(rng, modes, config)
@@ -196,8 +192,7 @@ def test_the_strongest_mode_comes_first() -> None:
     np.testing.assert_array_equal(np.sort(found, axis=0), np.sort(state, axis=0))
 
 
-@settings(max_examples=examples(20))
-@given(seed=st.integers(0, 10**6), radius=st.integers(0, 3))
+@drawn(20, seed=st.integers(0, 10**6), radius=st.integers(0, 3))
 def test_pooling_is_a_mean_over_the_pixels_that_exist(seed: int, radius: int) -> None:
     log_odds = np.random.default_rng(seed).uniform(-5, 5, (5, 7)).astype(np.float32)
     likelihood = np.empty_like(log_odds)
@@ -205,8 +200,7 @@ def test_pooling_is_a_mean_over_the_pixels_that_exist(seed: int, radius: int) ->
     np.testing.assert_allclose(likelihood, reference.pooled(log_odds.astype(float), radius), rtol=1e-5)
 
 
-@settings(max_examples=examples(20))
-@given(seed=st.integers(0, 10**6), count=st.integers(1, 9))
+@drawn(20, seed=st.integers(0, 10**6), count=st.integers(1, 9))
 def test_the_commonest_colour_is_the_one_with_most_companions(seed: int, count: int) -> None:
     frames = np.random.default_rng(seed).integers(0, 60, (count, 2, 3, 3)).astype(np.uint8)
     mean, variance = commonest_colours(frames, 25.5)
@@ -228,8 +222,7 @@ def boxes_of(*rows: tuple[float, float, float, float], score: list[float] | None
 
 def test_a_box_holds_a_soft_body_of_its_score() -> None:
     likelihood = box_likelihood(boxes_of((9.5, 4.5, 21, 51), score=[0.8]), (40, 60))
-    assert likelihood.dtype == np.float32
-    assert likelihood.max() == pytest.approx(0.8)
+    assert likelihood.dtype == np.float32 and likelihood.max() == pytest.approx(0.8)
     assert likelihood[35, 20] == pytest.approx(0.8)  # the trunk
     assert likelihood[8, 20] > 0.4  # the head
     assert likelihood[6, 11] == 0  # beside the head
@@ -239,8 +232,7 @@ def test_a_box_holds_a_soft_body_of_its_score() -> None:
     assert not likelihood[~inside].any()
 
 
-@settings(max_examples=examples(30))
-@given(seed=st.integers(0, 10**6), count=st.integers(0, 3), step=st.integers(1, 4))
+@drawn(30, seed=st.integers(0, 10**6), count=st.integers(0, 3), step=st.integers(1, 4))
 def test_the_box_map_is_its_definition(seed: int, count: int, step: int) -> None:
     rng = np.random.default_rng(seed)
     pixel = np.column_stack([rng.uniform(-10, 20, (count, 2)), rng.uniform(-1, 25, (count, 2))])
@@ -255,8 +247,7 @@ def test_boxes_that_are_no_boxes_are_refused() -> None:
     refused(InputError, "step", box_likelihood, boxes_of((0, 0, 1, 1)), (4, 4), step=0)
 
 
-@settings(max_examples=examples(30))
-@given(arrays(np.uint16, (6, 5), elements=st.sampled_from((0, 0, 0, 3, 7, 65535))))
+@drawn(30, arrays(np.uint16, (6, 5), elements=st.sampled_from((0, 0, 0, 3, 7, 65535))))
 @example(np.zeros((6, 5), np.uint16))
 def test_instance_boxes_are_tight(instances: NDArray[np.uint16]) -> None:
     boxes = instance_boxes(instances)

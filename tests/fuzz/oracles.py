@@ -47,10 +47,8 @@ def require_rig(recording: Recording) -> None:
     grid = recording.rig.grid
     assert limits.FRAME_RATE[0] <= recording.rig.frame_rate <= limits.FRAME_RATE[1]
     assert limits.CELL[0] <= grid.cell <= limits.CELL[1]
-    assert limits.TOP[0] <= grid.top <= limits.TOP[1]
-    assert grid.planes <= limits.PLANES
-    assert np.abs([grid.x, grid.y]).max() <= limits.METRES
-    assert len(recording.rig.cameras) <= limits.CAMERAS
+    assert limits.TOP[0] <= grid.top <= limits.TOP[1] and grid.planes <= limits.PLANES
+    assert np.abs([grid.x, grid.y]).max() <= limits.METRES and len(recording.rig.cameras) <= limits.CAMERAS
     assert len({camera.name for camera in recording.rig.cameras}) == len(recording.rig.cameras)
     text = format_rig(recording, recording.path)
     assert format_rig(parse_rig(text, recording.path), recording.path) == text

@@ -12,20 +12,9 @@ from pathlib import Path
 import numpy as np
 from run_files import small_trajectory, write_small_run
 
-from fuzz import corpus
+from fuzz import corpus, oracles
 from fuzz.corpus import GREY, RAMP, Maker, encoded, text
 from fuzz.mutations import mutated, mutated_objects
-from fuzz.oracles import (
-    require_answers,
-    require_areas,
-    require_boxes,
-    require_cameras,
-    require_config,
-    require_points,
-    require_rig,
-    require_run,
-    require_tracks,
-)
 from stseg.arrays import Boxes
 from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_fit import fit_points
@@ -107,7 +96,7 @@ def _frames_of(source: Source) -> None:
     stream = open_stream(source, CAMERA)
     views = list(takewhile(lambda view: view is not None, (stream.read() for _ in range(_FRAMES))))
     stream.close()
-    require_boxes([view for view in views if isinstance(view, Boxes)], CAMERA, source.path.parent)
+    oracles.require_boxes([view for view in views if isinstance(view, Boxes)], CAMERA, source.path.parent)
 
 
 def _frames(kind: SourceKind) -> Reader:
@@ -140,7 +129,7 @@ def _in_folder(name: str, kind: SourceKind = "boxes", first: str = "", view: int
 
 
 def _cameras(format: str, path: Path) -> None:
-    require_cameras(read_cameras(format, [path], OPTIONS))
+    oracles.require_cameras(read_cameras(format, [path], OPTIONS))
 
 
 def _picture(kind: SourceKind) -> Reader:
@@ -156,7 +145,7 @@ def _video(path: Path) -> None:
 
 def _run(path: Path) -> None:
     run = read_run(path)
-    require_run(run)
+    oracles.require_run(run)
     for table in ("tracks", "events", "ghosts", "windows", "rates", "shifts", "timings", "committed", "appearance"):
         getattr(run, table)
     for frame in run.frames[:2].tolist():
@@ -199,7 +188,7 @@ def _live_table(path: Path) -> None:
 
 
 def _zones(path: Path) -> None:
-    require_areas(zones := read_polygons(path))
+    oracles.require_areas(zones := read_polygons(path))
     for name, rings in zones:
         zone = Zone(name, rings)
         zone.contains(_GROUND)
@@ -207,13 +196,13 @@ def _zones(path: Path) -> None:
 
 
 def _lines(path: Path) -> None:
-    require_areas(lines := read_lines(path))
+    oracles.require_areas(lines := read_lines(path))
     for name, (points,) in lines:
         assert np.isfinite(Line(name, points).distance(_GROUND)).all()
 
 
 def _answers(path: Path) -> None:
-    require_answers(rows := read_answers(path, ACTIONS))
+    oracles.require_answers(rows := read_answers(path, ACTIONS))
     answers = [Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows]
     solve_corrections(Tracks(small_trajectory()).summary(), answers)
 
@@ -226,7 +215,7 @@ def _names(path: Path) -> None:
 
 
 def _points(path: Path) -> None:
-    require_points(tables := read_points(path))
+    oracles.require_points(tables := read_points(path))
     for table in tables:
         fit_points(table.camera, SIZE, Points(table.pixel, table.place[:, :2], table.place[:, 2]), None)
 
@@ -269,11 +258,11 @@ TARGETS = (
     Target("label_studio.json", _frames("instances")),
     Target("label_studio_video.json", _frames("boxes")),
     Target("via.json", _frames("instances")),
-    Target("rig.toml", lambda path: require_rig(parse_rig(path.read_text("utf-8", "replace"), path))),
-    Target("rig_file.toml", lambda path: require_rig(read_recording(path)), lambda _: text("rig.toml")),
-    Target("config.toml", lambda path: require_config(read_config(path), path.parent)),
-    Target("tracks.csv", lambda path: require_tracks(read_tracks_csv(path), path.parent)),
-    Target("points.csv", lambda path: require_points(read_points(path))),
+    Target("rig.toml", lambda path: oracles.require_rig(parse_rig(path.read_text("utf-8", "replace"), path))),
+    Target("rig_file.toml", lambda path: oracles.require_rig(read_recording(path)), lambda _: text("rig.toml")),
+    Target("config.toml", lambda path: oracles.require_config(read_config(path), path.parent)),
+    Target("tracks.csv", lambda path: oracles.require_tracks(read_tracks_csv(path), path.parent)),
+    Target("points.csv", lambda path: oracles.require_points(read_points(path))),
     Target("eight_points.csv", _points),
     Target("zones.geojson", _zones),
     Target("lines.geojson", _lines),

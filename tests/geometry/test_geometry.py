@@ -5,12 +5,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import assume, example, given
+from hypothesis import assume, example
 from hypothesis import strategies as st
 from recordings import compiled_only, track
 from reference_geometry import project_by_matrix, project_by_opencv
 from scenes import looking
-from strategies import BARREL, FISHEYE, LENSES, Pose, cameras, grids, numbers, poses, rigs
+from strategies import BARREL, FISHEYE, LENSES, Pose, cameras, drawn, grids, numbers, poses, rigs
 
 from stseg.arrays import Floats
 from stseg.commands.main import main
@@ -49,7 +49,7 @@ def straight_down(height: float = 3.0, lens: Lens | None = None) -> Camera:
     return Camera.from_projection("down", (644, 486), projection, lens)
 
 
-@given(cameras(), GROUNDS, HEIGHTS)
+@drawn(100, cameras(), GROUNDS, HEIGHTS)
 def test_single_points_are_projected_alike(camera: Camera, ground: Floats, height: float) -> None:
     expected, ahead = camera.project(ground, height)
     lens = LensTerms.of(camera.lens)
@@ -67,7 +67,7 @@ def test_a_rational_lens_distorts_points_one_by_one() -> None:
 
 
 class TestPlanes:
-    @given(poses(), GROUNDS, HEIGHTS)
+    @drawn(100, poses(), GROUNDS, HEIGHTS)
     def test_project_as_the_matrix_does(self, pose: Pose, ground: Floats, height: float) -> None:
         expected = project_by_matrix(pose.projection, in_space(ground, height))
         camera = Camera.from_projection("cam", (640, 480), pose.projection)
@@ -76,7 +76,7 @@ class TestPlanes:
         assert seen.all()
         np.testing.assert_allclose(pixel, expected, rtol=1e-9, atol=1e-6)
 
-    @given(cameras(lenses=False), HEIGHTS)
+    @drawn(100, cameras(lenses=False), HEIGHTS)
     def test_the_third_column_and_the_homology_of_the_image_are_one(self, camera: Camera, height: float) -> None:
         """Khan and Shah 2009, eq. 8: H(Z) = (I + Z a v l^T) H with the vanishing line l of the ground."""
         lift = np.eye(3) + height * np.outer(camera.vertical, np.linalg.inv(camera.ground)[2])
@@ -85,13 +85,13 @@ class TestPlanes:
 
 
 class TestCamera:
-    @given(cameras(), GROUNDS, HEIGHTS)
+    @drawn(100, cameras(), GROUNDS, HEIGHTS)
     def test_back_projection_returns(self, camera: Camera, ground: Floats, height: float) -> None:
         pixel, seen = camera.project(ground, height)
         assert seen.all()
         np.testing.assert_allclose(camera.back_project(pixel, height), ground, rtol=0, atol=1e-8)
 
-    @given(poses(), numbers(-9.0, 9.0).filter(lambda scale: abs(scale) > 1e-3), GROUNDS)
+    @drawn(100, poses(), numbers(-9.0, 9.0).filter(lambda scale: abs(scale) > 1e-3), GROUNDS)
     def test_scale_and_sign_of_the_homography_mean_nothing(self, pose: Pose, scale: float, ground: Floats) -> None:
         plain = Camera.from_projection("cam", (640, 480), pose.projection)
         scaled = Camera("cam", (640, 480), plain.ground * scale, plain.vertical * scale)
@@ -100,12 +100,12 @@ class TestCamera:
         assert seen.all() and seen_too.all()
         np.testing.assert_allclose(pixel, expected, rtol=1e-9, atol=1e-9)
 
-    @given(poses())
+    @drawn(100, poses())
     def test_centre(self, pose: Pose) -> None:
         camera = Camera.from_projection("cam", (640, 480), pose.projection * -2.0)
         np.testing.assert_allclose(camera.centre, -pose.rotation.T @ pose.translation, rtol=0, atol=1e-9)
 
-    @given(poses(), numbers(0.1, 50.0), numbers(-3.0, 3.0), numbers(-3.0, 3.0))
+    @drawn(100, poses(), numbers(0.1, 50.0), numbers(-3.0, 3.0), numbers(-3.0, 3.0))
     def test_points_behind_are_unseen(self, pose: Pose, depth: float, right: float, down: float) -> None:
         point = pose.rotation.T @ (np.array([right, down, -depth]) - pose.translation)
         for lens in (None, Lens(pose.matrix, np.array(BARREL))):
@@ -117,8 +117,7 @@ class TestCamera:
     def test_pixels_above_the_horizon_show_no_ground(self) -> None:
         camera = Camera.from_projection("cam", (640, 480), LEVEL)
         ground = camera.back_project(np.array([[320.0, 300.0], [320.0, 200.0]]))
-        assert np.isfinite(ground[0]).all()
-        assert np.isnan(ground[1]).all()
+        assert np.isfinite(ground[0]).all() and np.isnan(ground[1]).all()
 
     def test_heights_broadcast_with_points(self) -> None:
         pixel, seen = straight_down().project(np.zeros((4, 1, 2)), np.array([0.0, 1.0]))
@@ -154,7 +153,7 @@ class TestCamera:
 
 
 class TestLens:
-    @given(poses(), GROUNDS, HEIGHTS, st.sampled_from(LENSES))
+    @drawn(100, poses(), GROUNDS, HEIGHTS, st.sampled_from(LENSES))
     def test_distorts_as_opencv_does(
         self, pose: Pose, ground: Floats, height: float, chosen: tuple[tuple[float, ...], LensModel]
     ) -> None:
@@ -166,7 +165,7 @@ class TestLens:
         )
         np.testing.assert_allclose(camera.project(ground, height)[0], expected, rtol=0, atol=1e-6)
 
-    @given(numbers(0.0, 0.99), numbers(0.0, 6.3), st.sampled_from((LENS, WIDE)))
+    @drawn(100, numbers(0.0, 0.99), numbers(0.0, 6.3), st.sampled_from((LENS, WIDE)))
     def test_undistorts_everything_before_the_fold(self, share: float, angle: float, lens: Lens) -> None:
         radius = share * min(lens.fold, 20.0)  # 87 degrees off the axis
         ideal = MATRIX[:2, 2] + radius * np.array([np.cos(angle), np.sin(angle)]) * np.diag(MATRIX)[:2]
@@ -202,14 +201,13 @@ class TestLens:
 
 
 class TestGrid:
-    @given(grids())
+    @drawn(100, grids())
     def test_cells_and_ground_agree(self, grid: Grid) -> None:
         planes, rows, columns = grid.shape
         assert grid.ground.shape == (rows, columns, 2)
         cell = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1)
         np.testing.assert_allclose(grid.cell_of(grid.ground), cell, atol=1e-9)
-        assert len(grid.heights) == planes
-        assert grid.inside().shape == (rows, columns)
+        assert len(grid.heights) == planes and grid.inside().shape == (rows, columns)
 
     def test_first_centre_is_half_a_cell_inside_the_corner(self) -> None:
         grid = Grid((-2.5, 2.5), (-4.5, 1.5), cell=0.1, top=1.8, planes=10)
@@ -218,7 +216,7 @@ class TestGrid:
         np.testing.assert_allclose(grid.cell_of(np.array([-2.5, -4.5])), (-0.5, -0.5))
         np.testing.assert_allclose(grid.heights[[0, 1, -1]], (0.0, 0.2, 1.8))
 
-    @given(numbers(-1.0, 3.0), numbers(-1.0, 3.0))
+    @drawn(100, numbers(-1.0, 3.0), numbers(-1.0, 3.0))
     @example(0.5, 1.5)
     def test_polygon_may_be_hollow(self, x: float, y: float) -> None:
         ell = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]])
@@ -229,7 +227,7 @@ class TestGrid:
 
 
 class TestRig:
-    @given(rigs())
+    @drawn(100, rigs())
     def test_that_watches_its_area(self, rig: Rig) -> None:
         rig.require_coverage()
 
@@ -250,7 +248,7 @@ GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
 
 
 @pytest.mark.parametrize("distortion", [None, BARREL])
-@given(x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(0, 2), factor=st.integers(1, 6))
+@drawn(100, x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(0, 2), factor=st.integers(1, 6))
 def test_a_reduced_view_shows_each_point_in_its_square(
     distortion: tuple[float, ...] | None, x: float, y: float, height: float, factor: int
 ) -> None:
@@ -304,8 +302,7 @@ def test_boxes_of_a_run_are_in_the_pixels_of_the_images(tmp_path: Path) -> None:
     film = ["simulate", str(tmp_path / "film"), "--scene", "demo", "--seconds", "1.5", "--size", "320,240"]
     assert main(film) == 0
     rig, rows = tmp_path / "film" / "rig.toml", 25.0
-    factors = read_recording(rig).reduced(rows).factors
-    assert min(factors) > 1
+    assert min(read_recording(rig).reduced(rows).factors) > 1
     boxes = []
     for name, asked in (("whole.h5", 10000.0), ("reduced.h5", rows)):
         assert track(rig, tmp_path / name, options=("--set", f"foreground.body_rows={asked}")) == 0
@@ -318,10 +315,9 @@ def test_boxes_of_a_run_are_in_the_pixels_of_the_images(tmp_path: Path) -> None:
         assert one == pytest.approx(other, abs=0.05 * 320)
 
 
-@given(numbers(-3.0, 0.0), numbers(0.03, 0.5), st.integers(1, 40))
+@drawn(100, numbers(-3.0, 0.0), numbers(0.03, 0.5), st.integers(1, 40))
 def test_a_point_between_two_cells_touches_both(start: float, cell: float, columns: int) -> None:
     grid = Grid((start, start + 41 * cell), (0.0, 2 * cell), cell=cell, top=1.0, planes=1)
     point = (start + columns * cell, cell)
     touched = grid.touching((*point, *point))
-    assert touched[0].sum() == 2
-    assert touched[0, columns - 1 : columns + 1].all()
+    assert touched[0].sum() == 2 and touched[0, columns - 1 : columns + 1].all()

@@ -8,13 +8,12 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import compiled_only, track
 from refusals import refused
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
-from strategies import examples
+from strategies import drawn
 
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
@@ -59,14 +58,12 @@ def smooth_window(seed: int, shape: tuple[int, ...], neighbours: int = 8, smooth
     )
 
 
-@settings(max_examples=examples(60))
-@given(st.integers(0, 999), st.sampled_from(TINY), st.sampled_from((8, 80)))
+@drawn(60, st.integers(0, 999), st.sampled_from(TINY), st.sampled_from((8, 80)))
 def test_energy_by_definition(seed: int, shape: tuple[int, ...], neighbours: int) -> None:
     energy = window(seed, shape, 9, 5, neighbours=neighbours)
     labels = np.random.default_rng(seed).random(shape) < 0.5
     assert energy.of(labels) == reference.energy_of(energy, labels)
-    assert energy.of(labels.astype(np.int32)) == energy.of(labels)
-    assert energy.of(np.zeros(shape, bool)) == 0
+    assert energy.of(labels.astype(np.int32)) == energy.of(labels) and energy.of(np.zeros(shape, bool)) == 0
     assert energy.of(np.ones(shape, bool)) == -energy.unary.sum()
     assert sorted(zip(*(part.tolist() for part in energy.edges()), strict=True)) == sorted(reference.neighbours(energy))
 
@@ -91,8 +88,7 @@ def test_neighbourhoods_are_half_of_all_neighbours() -> None:
         assert [offset[0] for offset in offsets] == sorted(offset[0] for offset in offsets)
 
 
-@settings(max_examples=examples(60))
-@given(st.integers(0, 999), st.integers(0, 3))
+@drawn(60, st.integers(0, 999), st.integers(0, 3))
 def test_successors_are_injective(seed: int, drift: int) -> None:
     rng = np.random.default_rng(seed)
     motion = rng.integers(-drift, drift + 1, (2, 4, 5, 2)) * (rng.random((2, 4, 5, 1)) < 0.4)
@@ -111,9 +107,7 @@ def test_the_cut_is_the_smallest_of_the_minima(shape: tuple[int, ...]) -> None:
         occupied = minimum_cut(energy).occupied
         assert energy.of(occupied) == least, seed
         np.testing.assert_array_equal(occupied, smallest, err_msg=f"seed {seed}")
-        np.testing.assert_array_equal(
-            SOLVERS["pymaxflow"].grid(energy).occupied, smallest, err_msg=f"PyMaxflow, seed {seed}"
-        )
+        np.testing.assert_array_equal(SOLVERS["pymaxflow"].grid(energy).occupied, smallest, err_msg=f"seed {seed}")
 
 
 def flow_value(energy: GridEnergy) -> int:
@@ -146,8 +140,7 @@ def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, nei
         assert cut.nodes <= energy.unary.size
 
 
-@settings(max_examples=examples(40))
-@given(st.integers(0, 999), st.integers(1, 60), st.sampled_from((8, 80)))
+@drawn(40, st.integers(0, 999), st.integers(1, 60), st.sampled_from((8, 80)))
 def test_the_reduction_is_exact(seed: int, strength: int, neighbours: int) -> None:
     energy = window(seed, (3, 2, 4, 5), unary=strength, capacity=4, neighbours=neighbours)
     reduced = reduce(energy)
@@ -186,8 +179,7 @@ def test_smoothness_bridges_a_gap_along_the_motion() -> None:
     assert not straight[2].any()
 
 
-@settings(max_examples=examples(100))
-@given(st.integers(0, 9999), st.integers(1, 30), st.integers(0, 90))
+@drawn(100, st.integers(0, 9999), st.integers(1, 30), st.integers(0, 90))
 def test_sparse_cut_of_any_graph(seed: int, nodes: int, edges: int) -> None:
     rng = np.random.default_rng(seed)
     unary = rng.integers(-9, 10, nodes)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example
 from hypothesis import strategies as st
 from simulated_people import BORDER, CONFIG, RATE, Path, committed, gone, rows_of, runs, straight, swapped, visit
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally
@@ -62,64 +62,53 @@ def test_somebody_lost_inside_the_area_is_the_same_afterwards() -> None:
     assert set(found.identity.tolist()) == {1}
     (link,) = found.links
     assert (link.frame, link.identity, link.track) == (40, 1, 2)
-    assert link.reason.startswith("2.1 s on")
-    assert link.reason.isascii()
+    assert link.reason.startswith("2.1 s on") and link.reason.isascii()
     assert len(link.reason) <= EVENT["reason"].itemsize
-
-
-def test_too_long_is_somebody_else() -> None:
     rows = gone(CONFIG.tracking.maximum_gap + 0.25)
-    np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
+    np.testing.assert_array_equal(relinked(rows).identity, rows["id"], "too long is somebody else")
 
 
-@settings(max_examples=examples(100))
-@given(runs(6))
+@drawn(100, runs(6))
+@example(np.zeros(0, TRAJECTORY))
 def test_nobody_is_in_two_places_at_once(rows: Rows) -> None:
     found = relinked(rows)
     keys = list(zip(rows["frame"].tolist(), found.identity.tolist(), strict=True))
-    assert len(set(keys)) == len(rows) == len(found.identity)
-    assert (found.identity > 0).all()
+    assert len(set(keys)) == len(rows) == len(found.identity) and (found.identity > 0).all()
     for link in found.links:
         at = (rows["frame"] == link.frame) & (rows["id"] == link.track)
         assert found.identity[at].tolist() == [link.identity]
         assert (rows["frame"][found.identity == link.identity] < link.frame).any()
 
 
-@settings(max_examples=examples(60))
-@given(runs(5), st.integers(0, 999))
+@drawn(60, runs(5), st.integers(0, 999))
 def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(len(rows))
     one, other = relinked(rows), relinked(rows[order])
     np.testing.assert_array_equal(one.identity[order], other.identity)
-    assert one.links == other.links
-    assert relinked(rows).links == one.links
-
-
-def test_nobody_at_all() -> None:
-    found = relinked(np.zeros(0, TRAJECTORY))
-    assert len(found.identity) == len(found.links) == 0
+    assert one.links == other.links and relinked(rows).links == one.links
 
 
 def test_a_track_is_cut_at_encounters_and_gaps() -> None:
     rows = rows_of(PASSING, noise=0.0)
     rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
-    parts = sorted(
+    parts = [
         (int(rows["id"][part[0]]), *rows["frame"][part[[0, -1]]].tolist()) for part in isolated_tracklets(rows, RATE)
-    )
+    ]
     assert parts == [(1, 0, 31), (1, 32, 49), (1, 53, 63), (2, 0, 31), (2, 32, 63)]
 
 
-@given(runs(6))
+@drawn(100, runs(6))
 def test_stretches_hold_every_row_once(rows: Rows) -> None:
     parts = isolated_tracklets(rows, RATE)
     assert sorted(row for part in parts for row in part.tolist()) == list(range(len(rows)))
     for part in parts:
         own = rows[part]
-        assert len(set(own["id"].tolist())) == 1
-        assert (np.diff(own["frame"]) == 1).all()
+        assert len(set(own["id"].tolist())) == 1 and (np.diff(own["frame"]) == 1).all()
 
 
-@given(st.lists(st.tuples(st.integers(1, 3), st.integers(1, 4)), max_size=40), st.sampled_from([0.0, 1.0, 2.5, 4.0]))
+@drawn(
+    100, st.lists(st.tuples(st.integers(1, 3), st.integers(1, 4)), max_size=40), st.sampled_from([0.0, 1.0, 2.5, 4.0])
+)
 def test_the_prevailing_track_is_that_of_most_rows_around(steps: list[tuple[int, int]], reach: float) -> None:
     rows = np.zeros(len(steps), TRAJECTORY)
     rows["id"], rows["frame"] = [track for track, _ in steps], np.cumsum([step for _, step in steps])
@@ -169,8 +158,7 @@ def distance(value: Floats, a: Ints, b: Ints) -> float:
 def test_people_who_differ_are_far_apart_along_the_axes(name: str) -> None:
     rows = walkers()
     found = learned(rows, appearance(rows, rows["id"], 1.0, 1.0, 4, name))
-    assert found.value.shape[1] >= 2
-    assert (found.model.spread > 0.3).any()
+    assert found.value.shape[1] >= 2 and (found.model.spread > 0.3).any()
     early, late = rows["frame"] < 80, rows["frame"] >= 80
     for k in range(1, PEOPLE + 1):
         own = distance(found.value, (rows["id"] == k) & early, (rows["id"] == k) & late)
@@ -182,8 +170,7 @@ def test_people_who_differ_are_far_apart_along_the_axes(name: str) -> None:
 def test_numbers_that_say_nothing_of_the_person_add_nothing(seed: int) -> None:
     rows = walkers()
     found = learned(rows, appearance(rows, rows["id"], 1.0, 0.0, seed))
-    assert found.value.shape == (len(rows), 0)
-    assert len(found.model.spread) == 0
+    assert found.value.shape == (len(rows), 0) and len(found.model.spread) == 0
 
 
 def drifting(rows: Rows, noise: float, differ: float, frames: int, name: str) -> Rows:
@@ -259,7 +246,6 @@ def test_appearance_is_learned_from_mostly_wrong_identities() -> None:
 
 
 def test_without_rows_nothing_is_learned() -> None:
-    rows = walkers()[:0]
-    assert learned(rows, np.zeros(0, APPEARANCE)).value.shape == (0, 0)
+    assert learned(walkers()[:0], np.zeros(0, APPEARANCE)).value.shape == (0, 0)
     one = walkers()
     assert learned(one, np.zeros(0, APPEARANCE)).value.shape == (len(one), 0)

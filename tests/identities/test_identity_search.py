@@ -6,12 +6,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_identities import greatest_score, score
 from refusals import refused
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.commands.correct import correct
@@ -45,8 +44,7 @@ def found(seen: Observations, lag: float = 60.0, hypotheses: int = 400) -> Ints:
     return search_identities(seen, MODEL, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag)).name
 
 
-@settings(max_examples=examples(60))
-@given(runs(2))
+@drawn(60, runs(2))
 def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "_ALTERNATIVE_LOSS", 1e5)
@@ -126,13 +124,11 @@ def test_noise_and_spread_of_a_size_are_learned() -> None:
     people = np.random.default_rng(1).normal(1.7, 0.2, 60)
     model = learn_sizes(*sizes_of(people, 0.03), RATE)
     assert model.variance[0] == pytest.approx(0.03**2, rel=0.15)
-    assert model.spread[0] == pytest.approx(0.2**2, rel=0.3)
-    assert model.row_variance[0] < 3 * model.variance[0]
+    assert model.spread[0] == pytest.approx(0.2**2, rel=0.3) and model.row_variance[0] < 3 * model.variance[0]
 
 
 def test_a_size_that_is_everybodys_tells_nobody_apart() -> None:
-    model = learn_sizes(*sizes_of(np.full(400, 1.7), 0.03), RATE)
-    assert model.spread[0] < 0.012**2
+    assert learn_sizes(*sizes_of(np.full(400, 1.7), 0.03), RATE).spread[0] < 0.012**2
 
 
 def test_few_people_keep_the_prior() -> None:
@@ -145,8 +141,7 @@ def test_few_people_keep_the_prior() -> None:
 def identities(rows: Rows, constraints: Constraints) -> Ints:
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
     problem = IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, constraints)
-    found = associate_globally(rows, problem, constraints)
-    return found.identity
+    return associate_globally(rows, problem, constraints).identity
 
 
 def row(rows: Rows, track: int, frame: int) -> int:
@@ -190,8 +185,7 @@ def test_who_was_away_for_long_is_the_same_if_somebody_says_so() -> None:
     assert len(set(identities(near, Constraints.of([], pair)).tolist())) == 2
 
 
-@settings(max_examples=examples(40))
-@given(runs(4), st.data())
+@drawn(40, runs(4), st.data())
 def test_whatever_can_be_true_is_obeyed(rows: Rows, data: st.DataObject) -> None:
     """Constraints of any naming in which nobody is twice in a frame."""
     rng = np.random.default_rng(data.draw(st.integers(0, 99)))
@@ -223,16 +217,13 @@ def bound(rows: Rows, *answers: Answer) -> tuple[list[tuple[int, ...]], list[tup
     return [pair for pair, same in pairs if same], [pair for pair, same in pairs if not same]
 
 
-def test_answers_bind_rows_where_people_stand_apart() -> None:
+def test_answers_bind_rows_apart_and_ends_of_gaps() -> None:
     rows = met()
     away = 2 * np.abs(rows["x"][rows["id"] == 1])
     last, first = int(np.flatnonzero(away[:80] >= 0.8)[-1]), 80 + int(np.flatnonzero(away[80:] >= 0.8)[0])
     assert bound(rows, Answer("a", "swap", 1, 2, 80)) == ([(1, last, 2, first), (2, last, 1, first)], [])
     assert bound(rows, Answer("a", "keep", 1, 2, 80)) == ([(1, last, 1, first), (2, last, 2, first)], [])
     assert bound(rows, Answer("a", "split", 1, frame=80)) == ([], [(1, last, 1, first)])
-
-
-def test_answers_about_gaps_bind_the_ends() -> None:
     rows = gone(2.0)
     assert bound(rows, Answer("a", "join", 1, 2)) == ([(1, 23, 2, 40)], [])
     assert bound(rows, Answer("a", "keep", 1, 2, 30)) == ([], [(1, 23, 2, 40)])
@@ -263,8 +254,7 @@ def test_a_run_is_solved_again(undisturbed: Path, tmp_path: Path) -> None:
     for name in ("trajectory", "tracks", "boxes"):
         assert getattr(same, name).tobytes() == getattr(run, name).tobytes()
     new = solved(undisturbed, tmp_path / "new.h5", "swap,20,1,2,", "name,,2,,Bo", "delete,,3,,")
-    assert set(new.tracks["id"].tolist()) == {1, 2}
-    assert new.names == {2: "Bo"}
+    assert set(new.tracks["id"].tolist()) == {1, 2} and new.names == {2: "Bo"}
     for frame in (2, 26):
         places = [
             {int(r["id"]): (r["raw_x"], r["raw_y"]) for r in one.trajectory[one.trajectory["frame"] == frame]}

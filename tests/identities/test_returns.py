@@ -44,17 +44,13 @@ def found(visits: Visits, least: float = 0.9) -> dict[int, int]:
 def test_those_who_come_back_are_known_however_often() -> None:
     stays = ((0, 0, 9), (1, 5, 20), (0, 30, 40), (2, 35, 50), (1, 60, 70), (0, 60, 80), (3, 75, 90))
     assert found(visits_of(*stays)) == {13: 11, 15: 12, 16: 11}
+    assert found(visits_of((0, 0, 30), (0, 30, 40), (0, 10, 20))) == {}, "nobody comes back while there"
+    assert found(visits_of((0, 0, 30), (0, 31, 40))) == {12: 11}
 
 
 def test_a_return_tells_when_and_how_surely() -> None:
     (one,) = find_returns(visits_of((0, 0, 9), (1, 2, 60), (0, 30, 40)), SPREAD, 0.9)
-    assert (one.frame, one.identity, one.visit, one.absence) == (30, 11, 13, 21)
-    assert 0.9 < one.probability < 1
-
-
-def test_nobody_comes_back_while_there() -> None:
-    assert found(visits_of((0, 0, 30), (0, 30, 40), (0, 10, 20))) == {}
-    assert found(visits_of((0, 0, 30), (0, 31, 40))) == {12: 11}
+    assert (one.frame, one.identity, one.visit, one.absence) == (30, 11, 13, 21) and 0.9 < one.probability < 1
 
 
 def test_of_two_who_come_together_the_likelier_one_is_known() -> None:

@@ -1,48 +1,159 @@
-"""Detections as detectors and annotation tools write them: each format is recognised, and its malformed twin named."""
+"""Detections: box files of both forms, and each format of detectors and annotation tools with its malformed twin."""
 
 import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from attacks import write_rig
-from cases import cases
+from cases import cases, frozen, tables
+from hypothesis import strategies as st
+from recordings import data_path
 from refusals import refused
+from strategies import drawn
 
+from stseg.arrays import Bytes
 from stseg.commands.inspect import inspect
 from stseg.errors import FormatError, InputError, RigError, SourceError
 from stseg.geometry import Camera
+from stseg.io.detections.box_files import read_boxes
 from stseg.io.detections.masks import run_lengths
-from stseg.io.detections.record import listed_frames
-from stseg.io.detections.source_detections import read_source
+from stseg.io.detections.record import Detections, listed_frames
+from stseg.io.detections.source_detections import instance_image, read_source
 from stseg.io.recording.recording import Source
 from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.streams import open_stream
 
 SIZE = (80, 60)
+
+
+def read(folder: Path, text: str, first_frame: int = 0, frames: int | None = None) -> Detections:
+    path = folder / "boxes.txt"
+    path.write_text(text, encoding="utf-8")
+    return read_boxes(path, first_frame, frames)
+
+
+def test_csv_columns_come_in_any_order_and_others_are_ignored(tmp_path: Path) -> None:
+    text = 'label,height,width,top,left,score,frame\n"a, b",4,3,2,1,0.5,0\n,40,30,20,10,1,2\n'
+    table = read(tmp_path, text)
+    assert table.frames == 3 and table.at(0).pixel.tolist() == [[1, 2, 3, 4]]
+    assert table.at(0).score.tolist() == [0.5] and table.at(1).pixel.shape == (0, 4)
+    assert table.at(2).pixel.tolist() == [[10, 20, 30, 40]]
+
+
+@pytest.mark.parametrize("text", ["\ufeffframe, left, top, width, height\n0, 1, 2, 3, 4\n", "0,7,1,2,3,4\n"])
+def test_boxes_without_scores_are_believed(tmp_path: Path, text: str) -> None:
+    assert read(tmp_path, text).at(0).score.tolist() == [1]
+
+
+@pytest.mark.parametrize("separator", [",", " ", ", ", "  "])
+def test_motchallenge_lines(tmp_path: Path, separator: str) -> None:
+    lines = ["2 -1 5.5 6 7 8 0.25 -1 -1 -1", "1 -1 1e0 2 3 4 -1 -1 -1 -1"]
+    table = read(tmp_path, "\n".join(line.replace(" ", separator) for line in lines) + "\n\n", first_frame=1)
+    assert table.frames == 2 and table.at(0).pixel.tolist() == [[1, 2, 3, 4]]
+    assert table.at(0).score.tolist() == [1] and table.at(1).pixel.tolist() == [[5.5, 6, 7, 8]]
+    assert table.at(1).score.tolist() == [0.25]
+
+
+def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
+    assert read(tmp_path, "0 -1 1 2 3 4 1\n", frames=5).frames == 5
+    assert len(read(tmp_path, "", frames=5).at(4)) == 0
+    assert len(read(tmp_path, "frame,left,top,width,height\n", frames=5).at(0)) == 0
+
+
+@cases((f"{'9' * 5000},1,2,3,4,1", "line 3: found frame"))
+def test_bad_lines_are_named(tmp_path: Path, line: str, reported: str) -> None:
+    text = f"frame,left,top,width,height,score\n0,1,2,3,4,1\n{line}\n0,1,2,3,4,1\n"
+    refused(FormatError, reported, read, tmp_path, text)
+
+
+def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
+    refused(SourceError, "found no boxes", read, tmp_path, "")
+    refused(SourceError, "No such file", read_boxes, tmp_path / "none.csv")
+    refused(SourceError, "expected a file of boxes", read_boxes, tmp_path)
+    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00\x80")
+    refused(FormatError, "text file in UTF-8", read_boxes, tmp_path / "binary")
+
+
+@drawn(30, st.lists(st.tuples(st.integers(3, 9), *[st.floats(0, 1e4) for _ in range(4)], st.floats(0, 1)), min_size=1))
+def test_each_box_is_found_in_its_frame_in_the_order_of_the_file(tmp_path: Path, rows: list[tuple[float, ...]]) -> None:
+    header = "frame,left,top,width,height,score\n"
+    table = read(tmp_path, header + "".join(",".join(map(repr, row)) + "\n" for row in rows), first_frame=3)
+    assert table.frames == max(row[0] for row in rows) - 2
+    for frame in range(table.frames):
+        expected = [row[1:] for row in rows if row[0] == frame + 3]
+        found = table.at(frame)
+        np.testing.assert_array_equal(np.column_stack([found.pixel, found.score]), np.reshape(expected, (-1, 5)))
+
+
+@pytest.mark.parametrize(("name", "frames", "boxes"), [("CMC1_Cam1", 261, 1187), ("CMC2_Cam4", 263, 2221)])
+def test_real_detections(name: str, frames: int, boxes: int) -> None:
+    path = data_path(f"cmc/DET_{name}.txt")
+    table = read_boxes(path, first_frame=1)
+    assert table.frames == frames and sum(len(table.at(frame)) for frame in range(frames)) == boxes
+    assert set(table.score) == {1.0}
+
+
+def blob(seed: int) -> Bytes:
+    """The mask of a leaning ellipse with holes, uint8 (v, u)."""
+    random, (v, u) = np.random.default_rng(seed), np.mgrid[: SIZE[1], : SIZE[0]]
+    middle, wide, tall = random.uniform(15, 35, 2), random.uniform(3, 9), random.uniform(6, 14)
+    inside = ((u - middle[0] - 0.3 * v) / wide) ** 2 + ((v - middle[1]) / tall) ** 2 < 1
+    return np.asarray(inside & (random.random(inside.shape) > 0.1), np.uint8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_masks_of_pycocotools(seed: int) -> None:
+    tools = pytest.importorskip("pycocotools.mask")
+    mask = blob(seed)
+    encoded = tools.encode(np.asfortranarray(mask))
+    own = run_lengths(encoded["size"], encoded["counts"].decode())
+    np.testing.assert_array_equal(own.draw(SIZE), mask)
+    assert own.box() == tuple(tools.toBbox(encoded))
+
+
+def coco_results(folder: Path) -> tuple[Path, list[Bytes]]:
+    """Results as Detectron2 and MMDetection write them with pycocotools: boxes of masks, scores, categories."""
+    tools = pytest.importorskip("pycocotools.mask")
+    masks = [blob(seed) for seed in range(3)]
+    coded = [tools.encode(np.asfortranarray(mask)) for mask in masks]
+    rows = [
+        {"image_id": frame, "category_id": 1, "score": 0.5 + frame / 10, "bbox": tools.toBbox(one).tolist(),
+         "segmentation": {"size": one["size"], "counts": one["counts"].decode()}}
+        for frame, one in enumerate(coded)
+    ]  # fmt: skip
+    (folder / "results.json").write_text(json.dumps(rows))
+    return folder / "results.json", masks
+
+
+def test_results_of_pycocotools_are_read(tmp_path: Path) -> None:
+    path, masks = coco_results(tmp_path)
+    found = read_source(Source("instances", path), SIZE)
+    assert (found.format, found.frames, found.kept.score.tolist()) == ("COCO results", 3, [0.5, 0.6, 0.7])
+    for frame, mask in enumerate(masks):
+        np.testing.assert_array_equal(instance_image(found.kept, [frame], SIZE), mask)
+
+
+@pytest.mark.filterwarnings("ignore:Operation with tuple")  # of pandas, by motmetrics
+def test_truth_of_motmetrics_is_read(tmp_path: Path) -> None:
+    """A table of the package's own frames, written as its loader reads it."""
+    motmetrics, pandas = pytest.importorskip("motmetrics"), pytest.importorskip("pandas")
+    columns = ["FrameId", "Id", "X", "Y", "Width", "Height", "Confidence", "ClassId", "Visibility"]
+    table = pandas.DataFrame([[1, 1, 10, 12, 20, 30, 1, 1, 0.8], [3, 1, 5, 6, 10, 24, 1, 1, 1.0]], columns=columns)
+    table.to_csv(tmp_path / "gt.txt", index=False, header=False)
+    theirs = motmetrics.io.loadtxt(tmp_path / "gt.txt", fmt="mot15-2D", min_confidence=1)
+    found = read_source(Source("boxes", tmp_path / "gt.txt", 1), SIZE)
+    assert found.format == "MOTChallenge truth" and found.frames == 3
+    shift = np.array([1, 1, 0, 0])  # motmetrics counts pixels from 0, the files from 1
+    np.testing.assert_allclose(found.kept.pixel - shift, theirs[["X", "Y", "Width", "Height"]].to_numpy())
+
+
 BOXES = {0: [(10.0, 12.0, 20.0, 30.0, 0.9)], 2: [(5.0, 6.0, 10.0, 24.0, 0.5), (40.0, 8.0, 16.0, 40.0, 0.25)]}
 """By frame: left, top, width, height, score."""
 SAMPLES = Path(__file__).parent / "detections"
 """A folder a format, with the boxes as its program writes them."""
-FORMATS: dict[str, tuple[str, dict[str, Any]]] = {
-    "Ultralytics text": ("labels", {"first_frame": 1, "classes": ("person",)}),
-    "Ultralytics JSON": ("r.jsonl", {}),
-    "COCO results": ("results.json", {"select": "cam1/*", "classes": ("Person",)}),
-    "COCO data set": ("data.json", {"select": "cam1/*"}),
-    "MMDetection": ("preds", {"classes": ("0",)}),
-    "CSV": ("own.csv", {"columns": (("frame", "Bild"), ("x", "mx"), ("y", "my"), ("score", "p"))}),
-    "CSV with corners": ("own.csv", {"classes": ("person",)}),
-    "Parquet": ("b.parquet", {}),
-    "CSV of supervision": ("sink.csv", {"classes": ("person",)}),
-    "JSON table of supervision": ("sink.json", {"classes": ("person",)}),
-    "WILDTRACK": ("annotations_positions", {"view": 1}),
-    "MOTChallenge truth": ("gt.txt", {"first_frame": 1}),
-    "CVAT XML": ("video.xml", {"classes": ("person",)}),
-    "Label Studio": ("studio.json", {}),
-    "VIA": ("via.json", {"classes": ("person",)}),
-}
+FORMATS = tables(Path(__file__).with_suffix(".toml"))["formats"]
 """The file or folder of each, and the keys of its source."""
 ANNOTATED = ("WILDTRACK", "MOTChallenge truth", "CVAT XML", "Label Studio", "VIA")
 """Formats without scores."""
@@ -54,19 +165,18 @@ def sample(folder: Path, name: str) -> Source:
         pytest.importorskip("pyarrow")
     shutil.copytree(SAMPLES / name.lower().replace(" ", "_"), folder, dirs_exist_ok=True)
     (file, keys), images = FORMATS[name], folder / "images.json"
-    return Source("boxes", folder / file, **keys, image_list=images if images.exists() else None)
+    given = {key: frozen(value) for key, value in keys.items()}
+    return Source("boxes", folder / file, **given, image_list=images if images.exists() else None)
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_gives_the_same_boxes(tmp_path: Path, name: str) -> None:
     found = read_source(sample(tmp_path, name), SIZE)
-    assert name.startswith(found.format)
-    assert found.frames == 3
+    assert name.startswith(found.format) and found.frames == 3
     for frame in range(3):
         boxes, own = found.table.at(frame), BOXES.get(frame, [])
         np.testing.assert_allclose(boxes.pixel.reshape(-1, 4), np.array([b[:4] for b in own]).reshape(-1, 4), atol=1e-6)
-        scores = [1.0 if name in ANNOTATED else b[4] for b in own]
-        np.testing.assert_allclose(boxes.score, scores)
+        np.testing.assert_allclose(boxes.score, [1.0 if name in ANNOTATED else b[4] for b in own])
 
 
 @cases()
@@ -79,23 +189,15 @@ def test_a_malformed_twin_is_one_line(tmp_path: Path, name: str, file: str, old:
     assert "\n" not in refused(InputError, message, read_source, made, SIZE)
 
 
-STUDIO = {"type": "videorectangle", "value": {"sequence": []}}
-NAMES = ("cam1/0.png", "cam1/1.png", "cam2/0.png", "cam2/1.png")
-
-
 @cases()
-def test_annotations_of_other_cameras_sizes_and_shapes(
-    tmp_path: Path, file: str, content: object, message: str
-) -> None:
+def test_annotations_of_other_cameras_and_shapes(tmp_path: Path, file: str, content: object, message: str) -> None:
     text = f"<annotations>{content}</annotations>" if file == "a.xml" else json.dumps(content)
     (tmp_path / file).write_text(text)
     refused(InputError, message, read_source, Source("boxes", tmp_path / file), SIZE)
 
 
 @cases(("width", None, r"header: found the columns frame, left, top, height, score"))
-def test_a_malformed_table_of_parquet_is_one_line(
-    tmp_path: Path, column: str, values: list[object] | None, message: str
-) -> None:
+def test_malformed_parquet_is_one_line(tmp_path: Path, column: str, values: list[object] | None, message: str) -> None:
     pyarrow = pytest.importorskip("pyarrow")
     from pyarrow import parquet as writer
 
@@ -106,16 +208,9 @@ def test_a_malformed_table_of_parquet_is_one_line(
     assert "\n" not in refused(InputError, message, read_source, Source("boxes", tmp_path / "b.parquet"), SIZE)
 
 
-def test_broken_parquet_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
-    (tmp_path / "b.parquet").write_bytes(b"no")
-    refused(FormatError, "no Parquet", read_source, Source("boxes", tmp_path / "b.parquet"), SIZE)
-
-
 def test_classes_and_scores_choose(tmp_path: Path) -> None:
     made = sample(tmp_path, "Ultralytics text")
-    both = read_source(Source("boxes", made.path, 1), SIZE)
-    assert both.read.classes() == {"person": 3, "car": 2}
+    assert read_source(Source("boxes", made.path, 1), SIZE).read.classes() == {"person": 3, "car": 2}
     assert len(read_source(Source("boxes", made.path, 1, classes=("car",)), SIZE).kept) == 2
     assert len(read_source(Source("boxes", made.path, 1, least_score=0.6), SIZE).kept) == 3
     said = r"no detections of persn; classes are person \(3\), car \(2\)"

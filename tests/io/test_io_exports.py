@@ -22,11 +22,11 @@ import pytest
 import shapely
 import shapely.geometry
 import xarray
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import data_path
 from refusals import Command, refused
 from run_files import FRAMES, small_recording, small_trajectory, table_of, trajectory_of, write_run, write_small_run
+from strategies import drawn
 
 from stseg.arrays import Rows
 from stseg.commands.export import export
@@ -85,8 +85,7 @@ def test_every_format_is_written_by_its_name_and_twice_the_same(run: Run, tmp_pa
     for output in outputs:
         assert main(["export", str(run.path), "--to", name, "-o", str(output)]) == 0
     first, second = (output.read_bytes() for output in outputs)
-    assert len(first) > 100
-    assert first == second
+    assert len(first) > 100 and first == second
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -100,11 +99,10 @@ def test_help_names_every_format(stdout: Command) -> None:
     assert all(re.search(rf"(^|\s){name}:", shown, re.MULTILINE) for name in FORMATS)
 
 
-@given(there=st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=6, max_size=6), seed=st.integers(0, 99))
-@settings(max_examples=10)
-def test_tracks_with_gaps_come_back_place_by_place(
-    tmp_path_factory: pytest.TempPathFactory, there: list[list[bool]], seed: int
-) -> None:
+@drawn(
+    30, there=st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=6, max_size=6), seed=st.integers(0, 99)
+)
+def test_gaps_come_back(tmp_path_factory: pytest.TempPathFactory, there: list[list[bool]], seed: int) -> None:
     folder = tmp_path_factory.mktemp("gaps")
     frame, identity = np.nonzero(np.array(there, bool))
     x, y = np.random.default_rng(seed).uniform(0, 0.4, (2, len(frame))).round(4)
@@ -138,8 +136,7 @@ def test_a_library_that_is_missing_is_asked_for_in_one_line(
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
     said = f"{library}: found no such library, expected it: pip install 'stseg[{name}]'"
-    assert said in refusal("export", run.path, "--to", name, "-o", path)
-    assert not list(path.parent.iterdir())
+    assert said in refusal("export", run.path, "--to", name, "-o", path) and not list(path.parent.iterdir())
     refused(ConfigError, "Python: nowhere: found no such library", load_extra, "nowhere.at_all", "parquet")
 
 
@@ -266,7 +263,7 @@ def test_wildtrack_has_a_file_a_frame_and_says_its_grid(run: Run, path: Path) ->
         assert abs(0.025 * (position // 24) - row["y"]) <= 0.0126
 
 
-@given(position=st.integers(0, 480 * 1440 - 1))
+@drawn(100, position=st.integers(0, 480 * 1440 - 1))
 def test_over_wildtrack_s_area_the_grid_is_its_own(position: int) -> None:
     assert wildtrack_size(WILDTRACK) == (480, 1440)
     row = trajectory_of((0, 1, -3 + 0.025 * (position % 480), -9 + 0.025 * (position // 480)))
@@ -282,8 +279,7 @@ def test_wildtrack_s_own_files_have_the_same_members(run: Run, path: Path) -> No
     theirs = min(data_path("wildtrack/annotations_positions").glob("*.json"))
     FORMATS["wildtrack"].write(path, run)
     ((person, *_), *_), (one, *_) = wildtrack_files(path)[1].values(), json.loads(theirs.read_text("utf-8"))
-    assert set(person) == set(one)
-    assert set(person["views"][0]) == set(one["views"][0])
+    assert set(person) == set(one) and set(person["views"][0]) == set(one["views"][0])
     assert {type(value) for value in person["views"][0].values()} == {int}
 
 
@@ -307,8 +303,7 @@ def test_movement_s_boxes_in_xarray(run: Run, path: Path) -> None:
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert data.position.dims == data["shape"].dims == ("view", "time", "space", "individual")
         one = data.sel(view="left", individual="id_1").isel(time=0)
-        assert one.position.values.tolist() == [2.5, 4.0]
-        assert one["shape"].values.tolist() == [3.0, 4.0]
+        assert one.position.values.tolist() == [2.5, 4.0] and one["shape"].values.tolist() == [3.0, 4.0]
         assert float(one.confidence) == pytest.approx(1 / (1 + np.exp(-4.0)))
         assert int(data.position.notnull().sum()) == 2
 

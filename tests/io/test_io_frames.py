@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from cases import cases
 from films import write_at_rate
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 from recordings import blank_recording, data_path
 from refusals import refused
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError
@@ -75,9 +75,7 @@ def shown(rec: Recording, first: int = 0, stop: int | None = None) -> list[tuple
         ("instances", (12, 16), np.uint16),
     ],
 )
-def test_each_kind_gives_its_array(
-    tmp_path: Path, kind: SourceKind, shape: tuple[int, ...], dtype: type[np.generic]
-) -> None:
+def test_kinds_give_arrays(tmp_path: Path, kind: SourceKind, shape: tuple[int, ...], dtype: type[np.generic]) -> None:
     path = video(tmp_path / "a.avi", 3) if kind == "video" else images(tmp_path / "a", 3)
     rec = blank_recording(CameraSource(Source(kind, path)))
     with open_frames(rec) as reader:
@@ -98,15 +96,7 @@ def test_all_kinds_together(tmp_path: Path) -> None:
     )
     assert shown(rec) == [(frame, frame, frame, frame, frame) for frame in range(4)]
     assert shown(rec, 1, 3) == [(1, 1, 1, 1, 1), (2, 2, 2, 2, 2)]
-    assert shown(rec, 2) == [(2, 2, 2, 2, 2), (3, 3, 3, 3, 3)]
-    assert shown(rec, 4) == shown(rec, 2, 2) == []
-
-
-def test_mask_videos_of_lossy_codecs_are_grey(tmp_path: Path) -> None:
-    rec = blank_recording(CameraSource(Source("masks", video(tmp_path / "a.avi", 3, "MJPG"))))
-    with open_frames(rec) as reader:
-        views = [np.asarray(frame_set.views[0]) for frame_set in reader]
-    np.testing.assert_allclose(views, [shade(frame) for frame in range(3)], atol=2)
+    assert shown(rec, 2) == [(2, 2, 2, 2, 2), (3, 3, 3, 3, 3)] and shown(rec, 4) == shown(rec, 2, 2) == []
 
 
 def test_frames_are_counted_by_decoding(tmp_path: Path) -> None:
@@ -117,8 +107,7 @@ def test_frames_are_counted_by_decoding(tmp_path: Path) -> None:
     path.write_bytes(data)
     assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 7
     rec = blank_recording(CameraSource(Source("video", path)))
-    assert index_streams(rec).length == 5
-    assert len(shown(rec)) == 5
+    assert index_streams(rec).length == 5 and len(shown(rec)) == 5
 
 
 def test_a_frame_without_boxes_is_no_blind_view(tmp_path: Path) -> None:
@@ -158,23 +147,19 @@ def test_a_short_camera_is_an_error_or_blind(tmp_path: Path) -> None:
         refused(SourceError, reported, shown, blank_recording(whole, short), 3, stop)
     assert shown(blank_recording(whole, short), 0, 2) == [(0, 0, 0), (1, 1, 1)]
     rec = blank_recording(whole, box_camera(tmp_path, 2, blind=True))
-    assert shown(rec) == [(0, 0, 0), (1, 1, 1), (2, 2, None), (3, 3, None)]
-    assert index_streams(rec).length == 4
+    assert shown(rec) == [(0, 0, 0), (1, 1, 1), (2, 2, None), (3, 3, None)] and index_streams(rec).length == 4
 
 
 def test_a_recording_ends_with_its_required_cameras(tmp_path: Path) -> None:
     rec = blank_recording(box_camera(tmp_path, 2), box_camera(tmp_path, 5, blind=True))
     assert [row[0] for row in shown(rec)] == [0, 1]
     both_blind = blank_recording(box_camera(tmp_path, 2, blind=True), box_camera(tmp_path, 5, blind=True))
-    assert shown(both_blind, 3) == [(3, None, 3), (4, None, 4)]
-    assert index_streams(both_blind).length == 5
+    assert shown(both_blind, 3) == [(3, None, 3), (4, None, 4)] and index_streams(both_blind).length == 5
 
 
 @pytest.mark.parametrize("blind", [False, True])
 @pytest.mark.parametrize(("first", "stop", "least"), [(0, 5, 5), (4, None, 4), (9, 12, 12)])
-def test_ranges_beyond_the_end_are_errors(
-    tmp_path: Path, blind: bool, first: int, stop: int | None, least: int
-) -> None:
+def test_ranges_beyond_the_end_are_told(tmp_path: Path, blind: bool, first: int, stop: int | None, least: int) -> None:
     rec = blank_recording(box_camera(tmp_path, 3, blind=blind))
     said = f"rig.toml: frames: found a recording of 3 frames, expected at least {least}"
     refused(SourceError, said, shown, rec, first, stop)
@@ -185,14 +170,12 @@ def test_ranges_that_are_none_are_errors(tmp_path: Path, first: int, stop: int |
     refused(ConfigError, "0 <= first <= stop", open_frames, blank_recording(box_camera(tmp_path, 3)), first, stop)
 
 
-@settings(max_examples=examples(40))
-@given(
+@drawn(
+    40,
     cameras=st.lists(st.tuples(st.integers(1, 6), st.integers(-2, 3)), min_size=1, max_size=3),
     cuts=st.sets(st.integers(0, 9)),
 )
-def test_the_split_of_a_recording_does_not_matter(
-    tmp_path: Path, cameras: list[tuple[int, int]], cuts: set[int]
-) -> None:
+def test_the_split_of_a_film_does_not_matter(tmp_path: Path, cameras: list[tuple[int, int]], cuts: set[int]) -> None:
     rec = blank_recording(*[box_camera(tmp_path, frames, offset, blind=True) for frames, offset in cameras])
     length = max(frames + offset for frames, offset in cameras)
     assume(length >= 0)
@@ -202,7 +185,16 @@ def test_the_split_of_a_recording_does_not_matter(
     assert parts == shown(rec) == [(f, *views) for f, views in enumerate(own)]
 
 
-def test_skipping_in_a_video_is_exact(tmp_path: Path) -> None:
+def test_colour_frames_end_no_sooner_than_detections(tmp_path: Path) -> None:
+    rec = blank_recording(beside(tmp_path, 5, 3))
+    refused(SourceError, "camera cam1, images: found its end at frame 3, where the detections go on", shown, rec)
+
+
+def test_videos_of_lossy_codecs_are_grey_and_skipping_is_exact(tmp_path: Path) -> None:
+    rec = blank_recording(CameraSource(Source("masks", video(tmp_path / "a.avi", 3, "MJPG"))))
+    with open_frames(rec) as reader:
+        grey = [np.asarray(one.views[0]) for one in reader]
+    np.testing.assert_allclose(grey, [shade(frame) for frame in range(3)], atol=2)
     rec = blank_recording(CameraSource(Source("video", video(tmp_path / "a.mp4", 20, "mp4v")), offset=-3))
     with open_frames(rec, 7, 9) as reader:
         views = [frame_set.views[0] for frame_set in reader]
@@ -211,8 +203,7 @@ def test_skipping_in_a_video_is_exact(tmp_path: Path) -> None:
 
 def test_reading_goes_on_where_it_was_left(tmp_path: Path) -> None:
     with open_frames(blank_recording(box_camera(tmp_path, 4))) as reader:
-        assert next(reader).frame == 0
-        assert [frame_set.frame for frame_set in reader] == [1, 2, 3]
+        assert next(reader).frame == 0 and [frame_set.frame for frame_set in reader] == [1, 2, 3]
         assert list(reader) == []
 
 
@@ -237,11 +228,6 @@ def test_colour_frames_stand_beside_detections(tmp_path: Path) -> None:
     assert found == [(0, None, 0), (1, None, 1), (2, None, 2)]
     with open_frames(rec.without_images(), 2, 5) as reader:
         assert all(frame_set.images == () for frame_set in reader)
-
-
-def test_colour_frames_end_no_sooner_than_detections(tmp_path: Path) -> None:
-    rec = blank_recording(beside(tmp_path, 5, 3))
-    refused(SourceError, "camera cam1, images: found its end at frame 3, where the detections go on", shown, rec)
 
 
 def test_a_broken_image_is_named(tmp_path: Path) -> None:
@@ -284,8 +270,7 @@ def test_real_silhouettes_and_boxes() -> None:
         frame_sets = list(reader)
     assert [frame_set.frame for frame_set in frame_sets] == [270, 271]
     view = np.asarray(frame_sets[0].views[3])
-    assert view.shape == (486, 644)
-    assert 0 < np.mean(view) < 100
+    assert view.shape == (486, 644) and 0 < np.mean(view) < 100
     assert np.asarray(next(read_background(rec, 0))).shape == (486, 644, 3)
 
 

@@ -144,8 +144,7 @@ def test_boxes_have_no_label_images_and_blind_views_no_labels(tmp_path: Path) ->
     path = run_of(tmp_path / "run.h5", (masks, box_source(tmp_path / "east.csv")))
     assert main(["labels", str(path), "-o", str(tmp_path / "out")]) == 0
     assert [folder.name for folder in (tmp_path / "out").iterdir()] == ["west"]
-    images = read(tmp_path / "out", "west")
-    assert [image.any() for image in images] == [True, True, False, False]
+    assert [image.any() for image in read(tmp_path / "out", "west")] == [True, True, False, False]
 
 
 def box_source(path: Path) -> CameraSource:

@@ -81,8 +81,7 @@ def test_files_that_arrive_show_what_they_show_afterwards(arriving: Path, tmp_pa
     for first in (0, 13):
         with open_frames(recording, first) as after, followed(arriving, tmp_path, first, FRAMES) as frame_sets:
             for expected, frame_set in zip(after, frame_sets, strict=True):
-                assert frame_set.frame == expected.frame
-                assert now() - 60 < frame_set.arrived < now()
+                assert frame_set.frame == expected.frame and now() - 60 < frame_set.arrived < now()
                 np.testing.assert_array_equal(np.stack(frame_set.views), np.stack(expected.views))  # type: ignore[arg-type]
     assert FileNotes(tmp_path / "files.json").read["east"] == [(f"east_{k}.avi", PIECE) for k in (1, 2, 3)]
 
@@ -101,9 +100,7 @@ def test_files_that_were_read_may_go(tmp_path: Path) -> None:
         refused(SourceError, r"expected west_1\.avi", next, frame_sets)
 
 
-def test_reading_waits_for_whoever_takes_the_frames(
-    arriving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_reading_waits_for_who_takes_frames(arriving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read, whole = list[int](), VideoStream.read
 
     def counted(stream: VideoStream) -> AnyArray | None:
@@ -153,8 +150,7 @@ def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
 )
 def test_what_cannot_be_followed_is_refused(arriving: Path, source: Source) -> None:
     recording = read_recording(arriving)
-    assert not is_live(recording)
-    assert is_live(live())
+    assert not is_live(recording) and is_live(live())
     other = replace(recording, sources=(CameraSource(source), *recording.sources[1:]))
     refused(SourceError, "by a pattern", is_live, other)
 
@@ -200,8 +196,7 @@ def test_a_broken_stream_is_reopened_with_growing_pauses() -> None:
     with FollowedCameras(live(), QUICK, None, Event(), reported.append, opening(steady, breaking)) as frame_sets:
         some = list(islice(frame_sets, 50))
     blind = [k for k, frame_set in enumerate(some) if frame_set.views[1] is None]
-    assert blind
-    assert blind == list(range(blind[0], blind[-1] + 1))
+    assert blind and blind == list(range(blind[0], blind[-1] + 1))
     assert blind[-1] < 49
     assert not any(frame_set.dropped for frame_set in some)
     assert [line.split(";")[0] for line in reported] == [

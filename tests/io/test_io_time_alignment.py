@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from films import write_at_rate, write_stamped
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import blank_recording
 from refusals import refused
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation
 from stseg.engine.offline.segments import find_gaps
@@ -35,7 +34,6 @@ from stseg.io.runfile.unfinished.work_folder import WorkFolder
 
 RATE = 10.0
 recording = partial(blank_recording, rate=RATE)
-SIZE = (16, 12)
 NONE = np.zeros(0)
 
 
@@ -64,7 +62,7 @@ def a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("a.mp4").touch()
 
 
-@given(st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=60))
+@drawn(100, st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=60))
 def test_frames_within_half_a_tick_of_their_numbers_show_them(off: list[float]) -> None:
     position = np.arange(len(off)) + np.array([0.0, *off[1:]])
     position = np.maximum.accumulate(position) + 1e-9 * np.arange(len(off))
@@ -73,7 +71,7 @@ def test_frames_within_half_a_tick_of_their_numbers_show_them(off: list[float]) 
     assert len(off) - 1 <= len(frame_at_tick) <= len(off) + 1
 
 
-@given(st.lists(st.floats(0.05, 6.0), min_size=1, max_size=60), st.floats(0.2, 4.0))
+@drawn(100, st.lists(st.floats(0.05, 6.0), min_size=1, max_size=60), st.floats(0.2, 4.0))
 def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -> None:
     position = np.cumsum([0.0, *steps])
     frame_at_tick = nearest_frames(position, period)
@@ -81,8 +79,7 @@ def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -
     assert (np.diff(frame_at_tick[ticks]) >= 0).all()
     away = np.abs(position[frame_at_tick[ticks]] - ticks)
     least = np.abs(position[:, None] - np.arange(len(frame_at_tick))).min(axis=0, initial=np.inf)
-    assert (away <= 0.75 * max(1.0, period)).all()
-    assert (away <= least[ticks] + 0.5 * max(1.0, period)).all()
+    assert (away <= 0.75 * max(1.0, period)).all() and (away <= least[ticks] + 0.5 * max(1.0, period)).all()
     assert (least[np.flatnonzero(frame_at_tick < 0)] > 0.25 * max(1.0, period)).all()
 
 
@@ -106,22 +103,19 @@ def test_dropped_frames_leave_holes() -> None:
     assert nearest_frames(np.array([0.0, 1, 2, 5, 6, 8]), 1.0).tolist() == [0, 1, 2, -1, -1, 3, 4, -1, 5]
 
 
-@settings(max_examples=examples(50))
-@given(st.sampled_from([10.0, 15.0, 25.0, 29.97, 30.0]), st.lists(st.integers(1, 400), min_size=2, max_size=8))
+@drawn(50, st.sampled_from([10.0, 15.0, 25.0, 29.97, 30.0]), st.lists(st.integers(1, 400), min_size=2, max_size=8))
 def test_files_join_as_if_they_were_one(rate: float, lengths: list[int]) -> None:
     """Stamps in whole milliseconds, at the rig's rate or, for 29.97, that of the standard: no border leaves a trace."""
     true = 30000 / 1001 if rate == 29.97 else rate
     times = [np.round(np.arange(length) / true * 1000) for length in lengths]
     stamps = interpret_stamps(times, rate, [Path("x.mkv")] * len(times), NONE)
-    assert stamps is not None
-    assert np.abs(stamps.position - np.arange(sum(lengths))).max() < 0.1
+    assert stamps is not None and np.abs(stamps.position - np.arange(sum(lengths))).max() < 0.1
 
 
 def test_a_week_of_hours_does_not_drift() -> None:
     times = [np.round(every(1000 / RATE, 3600) + 0.3)] * 168
     stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 168, NONE)
-    assert stamps is not None
-    assert stamps.fits(np.arange(3600.0 * 168))
+    assert stamps is not None and stamps.fits(np.arange(3600.0 * 168))
 
 
 def test_another_rate_goes_on_over_borders() -> None:
@@ -129,8 +123,7 @@ def test_another_rate_goes_on_over_borders() -> None:
     stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 3, NONE)
     assert stamps is not None
     np.testing.assert_allclose(stamps.position, 0.4 * np.arange(1500), atol=1e-6)
-    assert stamps.period == pytest.approx(0.4)
-    assert stamps.steady
+    assert stamps.period == pytest.approx(0.4) and stamps.steady
 
 
 @pytest.mark.parametrize("times", [[0.0, 100, 100], [0.0, 100, 0], [np.nan] * 3, [0.0, 0.0, 0.0], [0.0, 100, 1e8]])
@@ -189,8 +182,7 @@ def test_clocks_that_drift_apart_are_held_together() -> None:
 def test_the_rig_may_say_what_is_believed() -> None:
     assert decided((video(clock="count"), WAVERING)) == TimeAlignment((None,), ())
     clock = decided((video(clock="stamps"), every(0.5, 60)))
-    assert np.asarray(clock.frame_at_tick[0]).tolist() == list(range(0, 60, 2))
-    assert clock.notes == ()
+    assert np.asarray(clock.frame_at_tick[0]).tolist() == list(range(0, 60, 2)) and clock.notes == ()
     said = "camera cam1, clock: found files without time stamps that rise"
     refused(SourceError, said, decided, (video(clock="stamps"), np.full(3, np.nan)))
 
@@ -219,8 +211,7 @@ def test_starts_are_one_for_each_file(starts: tuple[float, ...], reported: str) 
     refused(SourceError, f"camera cam1, source.starts: found {reported}", align_in_time, recording(source), times)
 
 
-@settings(max_examples=examples(60))
-@given(st.lists(st.tuples(st.integers(1, 9), st.integers(-4, 6), st.booleans()), min_size=1, max_size=3))
+@drawn(60, st.lists(st.tuples(st.integers(1, 9), st.integers(-4, 6), st.booleans()), min_size=1, max_size=3))
 def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None:
     rng = np.random.default_rng(0)
     sources, length = [], max(1, *(count + offset for count, offset, _ in cameras), 1)
@@ -239,8 +230,7 @@ def test_gaps_are_what_nobody_sees_for_long() -> None:
     shown = [np.array([[2, 8], [24, 29]]), np.array([[6, 10], [15, 22]])]
     assert find_gaps(shown, 0, 30, 2) == [(10, 15)]
     assert find_gaps(shown, 0, 30, 1) == [(0, 2), (10, 15), (22, 24)]
-    assert find_gaps(shown, 12, 23, 2) == [(12, 15)]
-    assert find_gaps(shown, 11, 14, 2) == [(11, 14)]
+    assert find_gaps(shown, 12, 23, 2) == [(12, 15)] and find_gaps(shown, 11, 14, 2) == [(11, 14)]
 
 
 def shown_number(view: Observation) -> int | None:

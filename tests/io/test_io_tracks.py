@@ -4,11 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 from run_files import table_of
-from strategies import examples
+from strategies import drawn
 
 from stseg.errors import FormatError, OutputError
 from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
@@ -32,11 +31,8 @@ def trajectory(rows: list[tuple[float, float]]) -> np.ndarray:
 METRES = st.floats(-1e4, 1e4)
 
 
-@given(rows=st.lists(st.tuples(METRES, METRES), max_size=5))
-@settings(max_examples=examples(25))
-def test_positions_survive_writing_and_reading(
-    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[float, float]]
-) -> None:
+@drawn(25, rows=st.lists(st.tuples(METRES, METRES), max_size=5))
+def test_positions_survive_a_table(tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[float, float]]) -> None:
     path = tmp_path_factory.mktemp("csv") / "tracks.csv"
     written = trajectory(rows)
     write_tracks_csv(path, written)
@@ -102,6 +98,5 @@ def test_numbers_are_read_as_python_reads_them(text: str) -> None:
 
 
 def test_whole_numbers_are_within_their_range() -> None:
-    assert parse_whole("7", 0, 9) == 7
-    assert parse_whole("10", 0, 9) is None
+    assert parse_whole("7", 0, 9) == 7 and parse_whole("10", 0, 9) is None
     assert parse_whole("1" * 5000, 0, 9) is None

@@ -44,9 +44,7 @@ def publisher_to(address: str, said: Callable[[str], None] = pytest.fail) -> Pub
      ("ws://h/t", {"connect.return_value.ping.return_value.wait.return_value": False,
                    "connect.return_value.__iter__": Mock(return_value=iter(())), "WebSocketException": OSError})],
 )  # fmt: skip
-def test_what_no_receiver_confirms_is_not_sent(
-    address: str, library: dict[str, object], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unconfirmed_is_not_sent(address: str, library: dict[str, object], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stseg.io.live.publishing.load_extra", lambda *_: MagicMock(**library))
     refused(OSError, "no answer of the", receiver_of(address).send, b"")
 
@@ -115,13 +113,10 @@ def test_rows_arrive_by_http(posted: tuple[str, list[bytes], list[int]]) -> None
         publisher.append(rows_of(7, 8))
         publisher.append(rows_of())
         publisher.append(rows_of(9))
-    assert [len(body.splitlines()) for body in bodies] == [2, 1]
-    assert parsed(bodies) == EXPECTED
+    assert [len(body.splitlines()) for body in bodies] == [2, 1] and parsed(bodies) == EXPECTED
 
 
-def test_an_unmeasured_height_is_null_there_and_nan_in_the_table(
-    posted: tuple[str, list[bytes], list[int]], tmp_path: Path
-) -> None:
+def test_an_unmeasured_height_is_null_there(posted: tuple[str, list[bytes], list[int]], tmp_path: Path) -> None:
     address, bodies, _ = posted
     rows = rows_of(7)
     rows["height"] = np.nan
@@ -133,9 +128,7 @@ def test_an_unmeasured_height_is_null_there_and_nan_in_the_table(
 
 
 @pytest.mark.parametrize("failures", [[503, 503], [302], [307]])
-def test_a_receiver_that_fails_for_a_while_gets_everything(
-    posted: tuple[str, list[bytes], list[int]], failures: list[int]
-) -> None:
+def test_a_receiver_that_fails_gets_all(posted: tuple[str, list[bytes], list[int]], failures: list[int]) -> None:
     """Redirects are failures: they would be followed without the rows."""
     address, bodies, answers = posted
     answers += failures

@@ -46,12 +46,10 @@ def run_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_silx_opens_the_file_at_the_volume(run_path: Path) -> None:
     with silx.io.open(str(run_path)) as file:
         shown = silx.io.nxdata.get_default(file)
-        assert shown is not None
-        assert shown.is_valid
+        assert shown is not None and shown.is_valid
         assert shown.group.name == layout.OCCUPANCY
         assert (shown.signal_dataset_name, shown.signal.shape) == ("log_odds", (6, 3, 4, 6))
-        assert shown.interpretation == "image"
-        assert shown.auxiliary_signals_dataset_names == ["label"]
+        assert shown.interpretation == "image" and shown.auxiliary_signals_dataset_names == ["label"]
         assert shown.axes_dataset_names == list(AXES)
         for axis, name in zip(shown.axes, AXES, strict=True):
             units, values = AXES[name]
@@ -71,8 +69,7 @@ def test_silx_reads_a_frame_and_a_table_by_their_address(run_path: Path) -> None
 def test_xarray_has_named_axes_with_units_and_selects_by_them(run_path: Path) -> None:
     with xarray.open_dataset(run_path, group="entry/occupancy", engine="h5netcdf", phony_dims="access") as data:
         assert data.log_odds.dims == data.label.dims == tuple(AXES)
-        assert data.views.dims == ("plane", "y", "x")
-        assert data.frame.dims == ("time",)
+        assert data.views.dims == ("plane", "y", "x") and data.frame.dims == ("time",)
         for name, (units, values) in AXES.items():
             assert data[name].attrs["units"] == units
             np.testing.assert_allclose(data[name], values)
@@ -128,8 +125,7 @@ def test_napari_s_layers_are_in_seconds_and_metres(run_path: Path) -> None:
             assert meta["scale"][index] == pytest.approx(values[1] - values[0])
             assert meta["translate"][index] == pytest.approx(values[0])
     for meta in (about, about_label, about_tracks):
-        assert meta["axis_labels"] == tuple(AXES)
-        assert meta["units"] == ("s", "m", "m", "m")
+        assert meta["axis_labels"] == tuple(AXES) and meta["units"] == ("s", "m", "m", "m")
     low, high = about["contrast_limits"]
     assert (low, high) == (0.0, pytest.approx(float(np.nanmax(small_volume()[0][3])), rel=1e-3))
     world = tracks[:, 1:] * about_tracks["scale"] + about_tracks["translate"]
@@ -141,8 +137,7 @@ def test_napari_s_layers_are_in_seconds_and_metres(run_path: Path) -> None:
 
 def test_napari_is_given_a_frame_at_a_time(run_path: Path) -> None:
     (volume, _, _), (label, _, _), _ = read_layers(str(run_path))
-    assert isinstance(volume, h5py.Dataset)
-    assert isinstance(label, h5py.Dataset)
+    assert isinstance(volume, h5py.Dataset) and isinstance(label, h5py.Dataset)
 
 
 def test_napari_s_other_files_are_left_to_others(run_path: Path, tmp_path: Path) -> None:

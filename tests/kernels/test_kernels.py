@@ -65,8 +65,7 @@ COMPILED = pytest.mark.skipif(not accelerate.COMPILED, reason="kernels are not c
 
 def test_python_and_kernels_call_the_same_kernel() -> None:
     values = np.array([1.0, 2.0, 4.0])
-    assert sum_of_halves(values, 3) == 3.5
-    assert half(values, 2) == 2.0
+    assert sum_of_halves(values, 3) == 3.5 and half(values, 2) == 2.0
     for called in (half, sum_of_halves):
         refused(IndexError, "beyond", called, values, 4)
 
@@ -137,9 +136,7 @@ def damaged(file: Path, kind: str) -> None:
         *in_ci(("empty", "nbi"), ("empty", "nbc"), ("flipped", "nbc"), ("writable", "nbi"), ("owned", "nbc")),
     ],
 )
-def test_files_of_the_cache_are_used_as_this_user_wrote_them(
-    cached: tuple[Path, list[str]], tmp_path: Path, kind: str, files: str
-) -> None:
+def test_foreign_cached_files_are_unused(cached: tuple[Path, list[str]], tmp_path: Path, kind: str, files: str) -> None:
     if kind == "owned" and os.geteuid():
         pytest.skip("only root gives files away")
     shutil.copytree(cached[0], tmp_path, dirs_exist_ok=True)
@@ -220,12 +217,7 @@ def farthest_of_own_walks(number: int, steps: int) -> float:
 def test_fields_of_inner_tuples_are_those_of_the_whole() -> None:
     walker = Walker(np.array([7]), Walk(np.array([1.0, 2.0, 4.0]), 2), 0.5)
     assert distance_by_address(walker) == distance(walker) == 1.5
-
-
-def test_arrays_are_not_copied() -> None:
-    walker = Walker(np.array([7, 8]), Walk(np.empty(0), 0), 0.5)
-    distance_by_address(walker)
-    np.testing.assert_array_equal(walker.name, [-1, 8])
+    np.testing.assert_array_equal(walker.name, [-1])  # arrays are not copied
 
 
 def test_what_a_kernel_makes_itself_lasts_as_long_as_the_call() -> None:

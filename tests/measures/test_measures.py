@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 from refusals import refused
 from run_files import table_of, trajectory_of, write_small_run
 
@@ -107,9 +108,7 @@ def zone_file(tmp_path: Path) -> Path:
     return path
 
 
-def test_the_command_writes_tables_and_python_gives_the_same(
-    tmp_path: Path, zone_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_and_python_agree(tmp_path: Path, zone_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = write_small_run(tmp_path / "run.h5")
     line = tmp_path / "line.geojson"
     line.write_text(json.dumps(feature("LineString", [[0.2, 0], [0.2, 0.4]])))
@@ -127,26 +126,9 @@ def test_the_command_writes_tables_and_python_gives_the_same(
     assert parquet.read_table(tmp_path / "p" / "zones.parquet").to_pylist()[0]["zone"] == "ground"
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("{", "no JSON"),
-        ("{}", "no Polygon or MultiPolygon, expected GeoJSON with a feature a zone"),
-        (json.dumps(feature("Polygon", [[[0, 0], [1, 1]]])), "a: found 2 points, expected 3 or more"),
-        (json.dumps(feature("Polygon", [["x"]])), "a: found coordinates that are no points"),
-        (json.dumps(feature("Polygon", 7)), "a: found coordinates that are no points"),
-        (json.dumps(feature("MultiPolygon", None)), "a: found coordinates that are no points"),
-        (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, "1"]]])), "a: found coordinates that are no points"),
-        (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1e300, 1]]])), "a: found coordinates that are no points"),
-        (json.dumps(feature("Polygon", [[[0, 0]] * 20_000])), "a: found 20000 points, expected at most 10000"),
-        (
-            json.dumps(feature("MultiPolygon", [[[[0, 0]] * 6000] * 2])),
-            "a: found 12000 corners or more",
-        ),
-        (json.dumps(feature("Polygon", [SQUARE.tolist()]) | {"properties": {"name": "\x1b"}}), r"name: found '.x1b'"),
-        ('{"features": 7}', "no Polygon"),
-        (json.dumps({"features": [feature("Polygon", [SQUARE.tolist()])] * 2}), "name: found 'a' twice"),
-    ],
+@cases(
+    (json.dumps(feature("Polygon", [[[0, 0]] * 20_000])), "a: found 20000 points, expected at most 10000"),
+    (json.dumps(feature("MultiPolygon", [[[[0, 0]] * 6000] * 2])), "a: found 12000 corners or more"),
 )
 def test_malformed_geojson_is_named(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "zones.geojson"

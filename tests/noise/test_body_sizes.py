@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, expecting, likelihoods, people, room
 from scipy.signal import lfilter
 from scipy.special import expit
-from strategies import examples, numbers
+from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.bodies.outlines import outlines
@@ -48,11 +47,7 @@ def open_to_one(*views: Flags) -> EvidenceAssignment:
     )
 
 
-def everything(view: PixelView) -> EvidenceAssignment:
-    return open_to_one(np.ones(view.shape, bool))
-
-
-@given(VALUES)
+@drawn(100, VALUES)
 def test_the_priors_variance_can_be_taken_out_again(values: tuple[float, float, float, float]) -> None:
     measured, prior = sizes_of(*values[:2]), sizes_of(*values[2:])
     again = measured.with_prior(prior).as_measurements(prior)
@@ -130,8 +125,7 @@ def test_wider_people_are_found_wider() -> None:
                 image[first[0] + k, start:stop] = 1.0
             observations.append(view.observe(image))
         found.append(float(body_sizes(at(place), np.array([0.42]), views, observations, own, BODY).width[0]))
-    assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04
-    assert found[1] == pytest.approx(WIDTH, abs=0.04)
+    assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04 and found[1] == pytest.approx(WIDTH, abs=0.04)
 
 
 def test_the_head_closes() -> None:
@@ -168,18 +162,16 @@ def test_who_is_known_keeps_their_height() -> None:
     expected = replace(expected, sizes=replace(expected.sizes, height_variance=np.full(1, 0.01**2)))
     seen = likelihoods(rig.cameras, standing)
     stranger, known = frame_pass.explain(seen, None).people, frame_pass.explain(seen, expected).people
-    assert known.track_index.tolist() == [0]
-    assert known.height[0] > stranger.height[0] + 0.05
+    assert known.track_index.tolist() == [0] and known.height[0] > stranger.height[0] + 0.05
     assert known.sizes.height[0] == pytest.approx(stranger.sizes.height[0], abs=0.03)
 
 
-@settings(max_examples=examples(20))
-@given(numbers(1.45, 1.95))
+@drawn(20, numbers(1.45, 1.95))
 def test_taller_people_are_found_taller(height: float) -> None:
     view = pixel_view()
     place, width = at(np.zeros((1, 2))), np.array([WIDTH])
     found = [
-        body_sizes(place, width, [view], [view.observe(seen)], everything(view), BODY).height[0]
+        body_sizes(place, width, [view], [view.observe(seen)], open_to_one(np.ones(view.shape, bool)), BODY).height[0]
         for tall in (height, height + 0.1)
         for seen in likelihoods([view.camera], people((0.0, 0.0, tall)))
     ]
@@ -240,8 +232,7 @@ def test_rows_of_a_long_time_count_as_their_mean_errs() -> None:
 def test_a_short_recording_keeps_the_prior() -> None:
     values, frame = recording(0.02, 0.0, 1.0, people=1, frames=5)
     errors = found(values, frame)
-    assert errors.variance[0] > 0.1 * PRIOR.variance[0]
-    assert np.isfinite(errors.row_variance(RATE)).all()
+    assert errors.variance[0] > 0.1 * PRIOR.variance[0] and np.isfinite(errors.row_variance(RATE)).all()
 
 
 def test_people_who_sit_down_are_no_errors() -> None:

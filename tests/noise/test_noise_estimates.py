@@ -7,11 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 from refusals import refused
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, expecting, found, likelihoods, people, rig_of, room
 from scipy.ndimage import maximum_filter
+from strategies import drawn
 
 from stseg.arrays import Boxes, Floats, Singles, ViewEvidence
 from stseg.bodies import box_fit
@@ -41,7 +41,7 @@ def test_tolerance_of_boxes_follows_their_score() -> None:
     np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
 
 
-@given(st.lists(st.floats(0, 1), max_size=5))
+@drawn(100, st.lists(st.floats(0, 1), max_size=5))
 def test_what_is_sharper_says_more(scores: list[float]) -> None:
     score = np.array(scores)
     tolerance, belief = PRIOR_NOISE.of(score)
@@ -53,9 +53,8 @@ def test_what_is_sharper_says_more(scores: list[float]) -> None:
 def test_stout_bodies_have_wide_tolerances_and_the_same_belief() -> None:
     score = np.array([0.3, 0.9])
     stout = BoxNoiseEstimate(RATE, CONFIG, BodyConfig(height_mean=0.6, width_mean=0.42).stoutness).noise.of(score)
-    for of_stout, person, ratio in zip(
-        stout, BoxNoiseEstimate(RATE, CONFIG).noise.of(score), (1.7 / 0.6, 1), strict=True
-    ):
+    slim = BoxNoiseEstimate(RATE, CONFIG).noise.of(score)
+    for of_stout, person, ratio in zip(stout, slim, (1.7 / 0.6, 1), strict=True):
         np.testing.assert_allclose(of_stout, ratio * person)
     assert BodyConfig().stoutness == BodyConfig().breadth == BodyConfig(width_mean=0.3).stoutness == 1.0
 
@@ -110,8 +109,11 @@ def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
     standing, sizes = people((-0.5, 0.3, 1.7), (0.5, -0.4, 1.7)), [view.camera.size for view in frame_pass.views]
     bodies = [view.table.boxes_of(standing[:, :2], standing[:, 2]) for view in frame_pass.views]
     grain = box_fit.EDGE_GRAIN[box_fit.LOWER_EDGE_BELOW]
-    lower = [body[:, 3] - bias * (body[:, 3] - body[:, 1] + grain) for body in bodies]
-    delivered = [boxes_of_edges(np.column_stack([body[:, :3], edge])) for body, edge in zip(bodies, lower, strict=True)]
+    delivered = []
+    for body in bodies:
+        high = body[:, 3] - body[:, 1] - bias * (body[:, 3] - body[:, 1] + grain)
+        pixel = np.column_stack([body[:, :2], body[:, 2] - body[:, 0], high])
+        delivered.append(Boxes(pixel, np.ones(len(body))))
     for _ in range(25):
         corrected = estimate.corrected(delivered, sizes)
         estimate.learn(frame_pass.explain(corrected, None), frame_pass.views, frame_pass.observe(corrected))
@@ -119,16 +121,11 @@ def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
     explanation, weight = frame_pass.explain(corrected, None), estimate.offsets.sums[0]
     one = [np.full_like(owner, -1) if k else owner for k, owner in enumerate(explanation.box_assignment)]
     estimate.learn(replace(explanation, box_assignment=tuple(one)), frame_pass.views, frame_pass.observe(corrected))
-    assert estimate.offsets.sums[0] == pytest.approx(
-        weight, rel=1e-3
-    )  # one view says nothing of the bias without the place
+    # One view says nothing of the bias without the place.
+    assert estimate.offsets.sums[0] == pytest.approx(weight, rel=1e-3)
     ends = [boxes for boxes in estimate.corrected(delivered, sizes) if isinstance(boxes, Boxes)]
     feet = [boxes.pixel[:, 1] + boxes.pixel[:, 3] for boxes in ends]
     assert max(np.abs(foot - body[:, 3]).max() for foot, body in zip(feet, bodies, strict=True)) < 2.0
-
-
-def boxes_of_edges(edges: Floats) -> Boxes:
-    return Boxes(np.column_stack([edges[:, :2], edges[:, 2:] - edges[:, :2]]), np.ones(len(edges)))
 
 
 def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
@@ -185,8 +182,7 @@ def test_means_and_spreads_by_the_formulas() -> None:
     assert after.height_spread == pytest.approx(np.sqrt(spread / (before + 3 * weight)))
     share = body.width_mean / body.height_mean
     relative = (before * share + 3 * weight * 0.25) / (before + 3 * weight)
-    assert after.width_mean == pytest.approx(relative * mean)
-    assert after.width_spread >= body.width_spread
+    assert after.width_mean == pytest.approx(relative * mean) and after.width_spread >= body.width_spread
 
 
 def test_the_spread_of_a_population_has_a_bound() -> None:
@@ -222,8 +218,7 @@ def test_a_run_among_children_learns_their_height() -> None:
             explained = asked.explain_next(estimates, 0, likelihoods(rig.cameras, people(*places)), None)
         assert len(explained.people) == 2
         means[who] = estimates.population.body.height_mean
-    assert means["children"] < 1.62
-    assert means["adults"] == pytest.approx(1.7, abs=0.04)
+    assert means["children"] < 1.62 and means["adults"] == pytest.approx(1.7, abs=0.04)
 
 
 def recording(body: BodyPrior) -> Recording:
@@ -235,19 +230,12 @@ def recording(body: BodyPrior) -> Recording:
 def test_the_rigs_bodies_are_kept_in_its_file() -> None:
     for body in (BodyPrior(), BodyPrior(height_mean=0.6), BodyPrior(0.6, 0.05, 0.5, 0.1)):
         text = format_rig(recording(body), Path("rig.toml"))
-        assert ("[body]" in text) == (body != BodyPrior())
-        assert parse_rig(text, Path("rig.toml")).body == body
+        assert ("[body]" in text) == (body != BodyPrior()) and parse_rig(text, Path("rig.toml")).body == body
 
 
-@pytest.mark.parametrize(
-    ("line", "key"),
-    [
-        ("height_mean = -1", "height_mean"),
-        ("heights = 1", "heights"),
-        ("width_mean = 0.3\nwidth_spread = 0.2", "width_spread"),
-    ],
-)
-def test_the_rigs_bodies_are_checked(line: str, key: str) -> None:
+@pytest.mark.parametrize("line", ["height_mean = -1", "heights = 1", "width_mean = 0.3\nwidth_spread = 0.2"])
+def test_the_rigs_bodies_are_checked(line: str) -> None:
+    key = line.splitlines()[-1].split()[0]
     text = format_rig(recording(BodyPrior()), Path("rig.toml")) + f"\n[body]\n{line}\n"
     refused(RigError, key, parse_rig, text, Path("rig.toml"))
 
@@ -309,8 +297,7 @@ def test_nothing_is_withdrawn_from_whole_silhouettes() -> None:
 
 def test_eaten_silhouettes_lose_their_rim() -> None:
     weak, strong = (learned_rims(APART, seen(APART, eaten)).withdrawn for eaten in (1, 3))
-    assert (strong > 0.8).all()
-    assert (weak < strong).all()
+    assert (strong > 0.8).all() and (weak < strong).all()
 
 
 def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
@@ -331,7 +318,7 @@ def test_torn_masks_are_read_by_their_own_rates() -> None:
     assert (rates[:, 0] > usual[0]).all() and (rates[:, 1] < usual[1]).all()
 
 
-@given(st.floats(0.01, 0.45), st.floats(0.01, 0.45))
+@drawn(100, st.floats(0.01, 0.45), st.floats(0.01, 0.45))
 def test_log_odds_by_other_rates_are_those_of_the_likelihood(miss: float, clutter: float) -> None:
     likelihood = np.linspace(0, 1, 21)[None]
 
@@ -357,8 +344,7 @@ def test_masks_are_most_likely_by_the_people_in_them() -> None:
         for tenths in (7, 8)
         for view, k in zip(inside, order, strict=True)
     ]
-    assert is_unexplained(shares[: len(views)], views)
-    assert not is_unexplained(shares[len(views) :], views)
+    assert is_unexplained(shares[: len(views)], views) and not is_unexplained(shares[len(views) :], views)
 
 
 def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
@@ -374,8 +360,7 @@ def test_a_view_without_people_takes_the_mean_of_the_others() -> None:
     rims = learned_rims(APART, seen(APART, 3))
     every = rims.withdrawn
     rims.shares.sums[2] = 0.0
-    assert rims.withdrawn[2] == pytest.approx(np.delete(every, 2).mean(), abs=0.1)
-    assert rims.withdrawn[2] > 0.5
+    assert rims.withdrawn[2] == pytest.approx(np.delete(every, 2).mean(), abs=0.1) and rims.withdrawn[2] > 0.5
 
 
 @pytest.mark.parametrize(

@@ -7,17 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 import reference_error_rates as reference
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, likelihoods, no_boxes, people, rig_of
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Flags, Floats, Ints, ViewEvidence
 from stseg.bodies.pillars import inside_bodies
 from stseg.config import ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
-from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
 from stseg.occupancy import shown_cells
 from stseg.occupancy.error_rate_estimate import (
     CLUTTER,
@@ -60,13 +59,7 @@ def teach(
     return errors[view], seen[view]
 
 
-def random_levels(rng: np.random.Generator, shape: tuple[int, ...], chance: Floats) -> Levels:
-    """Ones at their chance, all else zeros."""
-    return np.where(rng.random(shape) < chance, TOP_LEVEL, 0).astype(np.int16)
-
-
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(15))
+@drawn(15, st.integers(0, 2**32 - 1))
 def test_counts_by_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape = (2, 3, 4)
@@ -107,7 +100,8 @@ def test_rates_are_found() -> None:
     whole = (np.ones(shape, np.float32),) * 3
     for _ in range(300):
         chance = [np.where(inside, 1 - r.miss, np.where(near >= 0, r.near_clutter, r.clutter)) for r in true]
-        shown = reference.Shown(tuple(random_levels(rng, shape, c) for c in chance), whole)
+        maps = (np.where(rng.random(shape) < c, TOP_LEVEL, 0).astype(np.int16) for c in chance)
+        shown = reference.Shown(tuple(maps), whole)
         counted = [teach(i, shown, near, inside, np.array([True]), level.rates, 1.0) for i in range(3)]
         level.learn(np.stack(counted, 1)[::-1] / units, np.array([1.0, 0.25]))
     first = CONFIG.prior_weight / (CONFIG.prior_weight + level.counts.sums[0])
@@ -125,14 +119,12 @@ def test_soft_likelihoods_sharpen_the_rates() -> None:
         errors, seen = teach(0, shown, near, inside, np.array([True]), level.rates, 1.0)
         level.learn(np.stack([seen, errors])[:, None], np.zeros(2))
         rates.append(level.rates[0].miss)
-    assert (np.diff(rates) < 0).all()
-    assert rates[-1] < 0.1
+    assert (np.diff(rates) < 0).all() and rates[-1] < 0.1
 
 
 def test_the_first_guess_holds_at_first_and_comes_back() -> None:
     level = one_level(2)
-    assert level.rates == [FIRST, FIRST]
-    assert level.filled_share == 0.5
+    assert level.rates == [FIRST, FIRST] and level.filled_share == 0.5
     trials = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
     level.learn(np.stack([trials, trials * 0.5]), np.zeros(2))
     assert level.rates[1] == FIRST  # blind
@@ -191,8 +183,7 @@ def test_a_frame_is_fused_by_those_before_it(kind: str) -> None:
     np.testing.assert_array_equal(fusion.fuse_and_learn(running, *frames[0]).dense(), fusion.fuse(*frames[0]).dense())
     for one in frames[1:]:
         fusion.fuse_and_learn(running, *one)
-    assert running.rates != fresh.rates
-    assert fresh.rates == [fresh.rates[0]] * 4
+    assert running.rates != fresh.rates and fresh.rates == [fresh.rates[0]] * 4
     assert all(r.near_clutter > r.clutter for r in running.rates)
 
 
@@ -216,8 +207,7 @@ def test_a_blind_view_learns_nothing() -> None:
     running = fusion.new_error_rates()
     seen, explanation = frame("pixels", 0)
     fusion.fuse_and_learn(running, [None, *seen[1:]], explanation)
-    assert not running.counts.sums[0][0].any()
-    assert running.counts.sums[0][1:].all()
+    assert not running.counts.sums[0][0].any() and running.counts.sums[0][1:].all()
     fusion.fuse_and_learn(running, [None] * 4, explanation)
     assert running.rates[0] == ErrorRates(*running.first[0])
 
@@ -244,5 +234,4 @@ def test_a_detector_is_not_blamed_for_the_hidden() -> None:
         box_assignment=(np.zeros(0, np.int64), *explanation.box_assignment[1:]),
     )
     fusion.fuse_and_learn(running, [no_boxes(), *seen[1:]], unseen)
-    assert not running.counts.sums[0][0, MISS].any()
-    assert running.counts.sums[0][1:, MISS].all()
+    assert not running.counts.sums[0][0, MISS].any() and running.counts.sums[0][1:, MISS].all()

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import example, given, settings
+from hypothesis import example
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, detector_of, evidence_of, found, looking, people, rig_of
-from strategies import examples, numbers, rigs
+from strategies import drawn, numbers, rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
 from stseg.bodies.box_fit import TOLERANCE
@@ -54,19 +54,18 @@ def noise(seed: int) -> list[Singles]:
     return [(rng.random((96, 128)) ** (k + 1)).astype(np.float32) for k in range(4)]
 
 
-@given(st.integers(1, 20), st.integers(1, 20), st.integers(1, 25), st.integers(0, 99))
+@drawn(100, st.integers(1, 20), st.integers(1, 20), st.integers(1, 25), st.integers(0, 99))
 def test_clutter_by_definition(height: int, width: int, side: int, seed: int) -> None:
     likelihood = np.random.default_rng(seed).random((height, width)).astype(np.float32)
     assert clutter(likelihood, side) == pytest.approx(reference.clutter(likelihood, side), abs=1e-7)
 
 
-@given(st.lists(st.just(np.nan) | numbers(0, 0.5), max_size=6), numbers(0, 0.5))
+@drawn(100, st.lists(st.just(np.nan) | numbers(0, 0.5), max_size=6), numbers(0, 0.5))
 @example([0.1, 0.1, 0.1], 0.0)  # a view that sees nothing does not silence the others
 def test_weights_fall_with_clutter_down_to_the_median(others: list[float], clutter: float) -> None:
     clutters = np.array([*others, clutter])
     weights, awake = clutter_weights(clutters), ~np.isnan(clutters)
-    assert (weights[~awake] == 0).all()
-    assert weights[awake].mean() == pytest.approx(1.0)
+    assert (weights[~awake] == 0).all() and weights[awake].mean() == pytest.approx(1.0)
     floor = max(float(np.median(clutters[awake])), 1e-6)
     share = weights[awake] * np.maximum(clutters[awake], floor)
     np.testing.assert_allclose(share, share[0])
@@ -76,8 +75,7 @@ def test_weights_fall_with_clutter_down_to_the_median(others: list[float], clutt
 KINDS: list[SamplingKind] = ["point", "footprint"]
 
 
-@settings(max_examples=examples(15))
-@given(rigs(most=2), st.sampled_from(KINDS))
+@drawn(15, rigs(most=2), st.sampled_from(KINDS))
 def test_cells_are_looked_up_where_they_project(rig: Rig, kind: SamplingKind) -> None:
     sampling = Sampling.of(rig, kind)
     counts = rig.grid.inside()
@@ -115,13 +113,11 @@ def test_a_footprint_has_the_spread_of_the_cells_image(distortion: Sequence[floa
     sides = image.std(2) * np.sqrt(12 / 0.99)  # of a box of the same variances; the lattice's is 0.99 of the cell's
     left_top, right_bottom = footprint[..., :2], footprint[..., :2] + footprint[..., 2:]
     whole = (left_top > 0).all(-1) & (right_bottom < camera.size).all(-1)
-    assert whole.sum() > 500
-    assert footprint[whole][:, 2:].max() > 20
+    assert whole.sum() > 500 and footprint[whole][:, 2:].max() > 20
     np.testing.assert_allclose(footprint[whole][:, 2:], sides[whole], atol=0.51, rtol=0.02)
 
 
-@settings(max_examples=examples(15))
-@given(st.integers(0, 999))
+@drawn(15, st.integers(0, 999))
 def test_likelihood_per_plane_by_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     camera = corner_cameras()[seed % 4]
@@ -176,11 +172,6 @@ LEVEL = 0.01
 """Nats: what rounding likelihoods to levels may do to the log-odds of four views."""
 
 
-def rounded(likelihood: Singles) -> Singles:
-    """A map in whole levels."""
-    return np.asarray(np.rint(likelihood * TOP_LEVEL) / TOP_LEVEL, np.float32)
-
-
 def volume_by_definition(
     rig: Rig, maps: Sequence[Singles | None], explanation: Explanation, kind: SamplingKind
 ) -> Floats:
@@ -203,7 +194,8 @@ def volume_by_definition(
                 continue
             away, people_away = float(np.hypot(*(place - centre))), np.hypot(*(people_at - centre).T)
             box = footprints[i].tolist()
-            share, mean = reference.left_to_cell(rounded(shown), box, explanation, i, near_person, away, people_away)
+            levels = np.asarray(np.rint(shown * TOP_LEVEL) / TOP_LEVEL, np.float32)  # a map in whole levels
+            share, mean = reference.left_to_cell(levels, box, explanation, i, near_person, away, people_away)
             if share > 0:
                 terms.append(reference.log_odds_term(mean, RATES))
                 shares.append(share)
@@ -259,8 +251,7 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
 def line_of_sight() -> tuple[Rig, Explanation]:
     """One camera; a person in the middle of the room explains all that it sees."""
     rig = rig_of([looking("west", (-4.0, 0.0, 2.4))])
-    everything = np.zeros((96, 128), np.int64)
-    return rig, explained(rig, people((0.0, 0.0)), [everything])
+    return rig, explained(rig, people((0.0, 0.0)), [np.zeros((96, 128), np.int64)])
 
 
 def test_explained_evidence_does_not_speak_elsewhere() -> None:
@@ -272,8 +263,7 @@ def test_explained_evidence_does_not_speak_elsewhere() -> None:
     away = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0))
     in_front = seen & (rig.grid.ground[..., 0] < -0.5)
     np.testing.assert_allclose(fused[0][in_front], nobodys[0][in_front], rtol=1e-6)
-    assert (fused[0][in_front] < PRIOR).all()
-    assert (fused[0][seen & (away < 0.3)] > 1.0).all()
+    assert (fused[0][in_front] < PRIOR).all() and (fused[0][seen & (away < 0.3)] > 1.0).all()
 
 
 def test_a_hidden_view_does_not_count() -> None:

@@ -139,8 +139,7 @@ def test_the_rig_file_shown_is_one() -> None:
     assert [camera.name for camera in recording.rig.cameras] == ["cam1", "cam2"]
     assert {source.source.kind for source in recording.sources} <= set(SOURCE_KINDS)
     assert all(f"| `{kind}` |" in INPUTS for kind in SOURCE_KINDS)
-    scene = tomllib.loads(text)["scene"]
-    assert {"x", "y", "polygon", "frame_rate"} <= set(scene)
+    assert {"x", "y", "polygon", "frame_rate"} <= set(tomllib.loads(text)["scene"])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)

@@ -65,8 +65,7 @@ def test_the_flow_is_pedpy_s(run: Run) -> None:
     _, crossing = pedpy.compute_n_t(traj_data=data, measurement_line=line)
     first = (found.groupby("id")["time"].min() * run.frame_rate).round().astype(int)  # PedPy counts who crosses once
     first = first[first < run.frames[-1]]  # and not in the last frame
-    assert first.to_dict() == dict(zip(crossing["id"], crossing["frame"], strict=True))
-    assert len(first) > 3
+    assert first.to_dict() == dict(zip(crossing["id"], crossing["frame"], strict=True)) and len(first) > 3
 
 
 def test_speed_and_density_are_those_of_people(run: Run) -> None:
@@ -75,13 +74,11 @@ def test_speed_and_density_are_those_of_people(run: Run) -> None:
     data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run.path)
     area = pedpy.MeasurementArea([(-3, -3), (3, -3), (3, 3), (-3, 3)])
     density = pedpy.compute_classic_density(traj_data=data, measurement_area=area)["density"]
-    assert table.index.min() - 0.051 <= density.min()
-    assert density.max() <= table.index.max() + 0.051
+    assert table.index.min() - 0.051 <= density.min() and density.max() <= table.index.max() + 0.051
 
 
 def test_it_prints_both(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     flow_and_density.main(str(run.path))
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("to the left of the line: ")
-    assert lines[3] == "density 1/m2  speed m/s  places   (36.0 m2)"
-    assert len(lines) > 4
+    assert lines[3] == "density 1/m2  speed m/s  places   (36.0 m2)" and len(lines) > 4

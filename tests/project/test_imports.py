@@ -7,60 +7,17 @@ from functools import cache, cached_property
 from pathlib import Path
 
 import pytest
+from cases import tables
 from recordings import process
 
 ROOT = Path(__file__).parents[2]
 
-FOUNDATION = ("version", "import_path", "errors", "arrays", "kernels", "config", "geometry", "bodies", "records")
-"""Each may import those before it; everything below may import all of them."""
-
+RULES = tables(Path(__file__).with_suffix(".toml"))
+FOUNDATION, NEEDED, AT_HOME = RULES["foundation"], RULES["needed"], RULES["at_home"]
+STAGES: dict[str, set[str]] = {stage: set(parts) for stage, parts in RULES["stages"].items()}
+BESIDE: dict[str, set[str]] = {room: set(parts) for room, parts in RULES["beside"].items()}
 SOLVER = "graphcut"
 """Minimum cuts and expansion moves: they know nothing of people, and could be a package of their own."""
-
-STAGES: dict[str, set[str]] = {
-    "foreground": set(),
-    "view_health": set(),
-    "noise": {"view_health"},
-    "detection": {"view_health", "noise"},
-    "occupancy": set(),
-    "segmentation": {SOLVER},
-    "tracking": {"noise"},
-    "identities": {"noise", "tracking"},
-    "trajectories": {"noise", "tracking", "identities"},
-    "pixel_labels": {SOLVER},
-}
-"""In the order of the data: what each may import besides the foundation. What two share is a record of `records`."""
-
-BESIDE = {
-    "trackers": {"occupancy", "segmentation", "tracking", SOLVER},
-    "baselines": {"trackers", "tracking", "occupancy"},
-    "evaluation": {"errors", "arrays", "geometry"},
-    "measures": {"errors", "arrays", "geometry"},
-    "io": {"version", "errors", "arrays", "config", "geometry", "records"},
-    "calibration": {"errors", "arrays", "geometry", "bodies"},
-    "reporting": {"errors", "arrays", "geometry", "bodies", "records"},
-    "simulation": {"errors", "arrays", "kernels", "geometry"},
-}
-"""Rooms above or beside the stages. Nothing imports the baselines: registries name them (`stseg.trackers`)."""
-
-AT_HOME = {
-    "h5py": ("stseg.io",),
-    "cv2": ("stseg.io", "stseg.reporting", "stseg.simulation", "stseg.calibration", "stseg.view_health"),
-    "PIL": ("stseg.io",),
-    "numba": ("stseg.kernels",),
-    "maxflow": ("stseg.graphcut.solvers",),
-    "cyclopts": ("stseg.commands",),
-    "rich": ("stseg.commands",),
-    "distributed": ("stseg.engine.workers.cluster",),  # imported where a scheduler is asked for
-    "pandas": ("stseg.io",),  # its types; it is imported where a data frame is asked for
-    "xarray": ("stseg.io",),  # the same
-    "tomllib": ("stseg.io",),
-    "pathlib": ("stseg.kernels", "stseg.io", "stseg.engine", "stseg.tasks", "stseg.commands"),
-}
-"""Libraries, and the only modules that know them."""
-
-NEEDED = ("numpy", "scipy")
-"""Libraries that every module may use."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +91,7 @@ def test_a_module_imports_what_stands_below_it() -> None:
 def test_a_library_is_known_where_it_belongs(library: str) -> None:
     at_home = [module for module in modules() if library in {name.split(".")[0] for name in module.imports}]
     for module in at_home:
-        assert module.name.startswith(AT_HOME[library]), f"{module.name} imports {library}"
+        assert module.name.startswith(tuple(AT_HOME[library])), f"{module.name} imports {library}"
     assert at_home, f"nothing imports {library}"
 
 

@@ -49,8 +49,7 @@ def test_the_conda_recipe_requires_what_the_wheel_does(project: dict[str, Any]) 
 def test_the_workflows_run_supported_versions(project: dict[str, Any]) -> None:
     versions = [name.rpartition(" ")[2] for name in project["classifiers"]]
     run = parsed(".github/workflows/ci.yml")["jobs"]["run"]["strategy"]["matrix"]["python"]
-    assert run == [versions[0], versions[-1]]
-    assert project["requires-python"] == f">={versions[0]}"
+    assert run == [versions[0], versions[-1]] and project["requires-python"] == f">={versions[0]}"
     steps = parsed(".github/workflows/platforms.yml")["jobs"]["wheel"]["steps"]
     assert {step["with"]["python-version"] for step in steps if "with" in step} <= set(versions)
 
@@ -60,8 +59,7 @@ def test_ci_names_rooms_and_tools_that_exist() -> None:
     named = re.findall(r"(?:tests|tools)/[^\s\"]+", (ROOT / ".ci" / "run").read_text("utf-8"))
     expanded = subprocess.run(["bash", "-c", f"echo {' '.join(named)}"], check=True, capture_output=True, text=True)
     paths = expanded.stdout.split()
-    assert len(paths) > 10
-    assert [path for path in paths if not (ROOT / path).exists()] == []
+    assert len(paths) > 10 and [path for path in paths if not (ROOT / path).exists()] == []
 
 
 _BUILD = "import sys; from setuptools.build_meta import build_wheel; build_wheel(sys.argv[1])"

@@ -13,15 +13,8 @@ from stseg.config import BodyConfig
 from stseg.geometry import Grid
 from stseg.geometry.rig import BODY_HEIGHT
 from stseg.io.runfile.runs import read_run
+from stseg.records import cell_reliability
 from stseg.records.border import Border
-from stseg.records.cell_reliability import (
-    LOG_ODDS_KNOTS,
-    CellCounts,
-    CellReliability,
-    count_cells,
-    doubtful_cells,
-    filled_cells,
-)
 from stseg.records.forgetting import Forgetting
 from stseg.records.sizes import Sizes
 from stseg.records.tables import TRAJECTORY, Tracks
@@ -56,8 +49,7 @@ def test_rows_are_forgotten_by_themselves() -> None:
     forgetting.add(np.ones((2, 3)))
     forgetting.forget(1)
     forgetting.add(np.ones(3), 1)
-    assert (forgetting.sums[0] == 1.0).all()
-    assert (forgetting.sums[1] > 1.0).all()
+    assert (forgetting.sums[0] == 1.0).all() and (forgetting.sums[1] > 1.0).all()
     np.testing.assert_array_equal(forgetting.with_prior(2.0, np.ones(3))[0], 3.0)
 
 
@@ -74,7 +66,7 @@ def test_evidence_that_counts_twice_is_calibrated() -> None:
     log_odds = rng.normal(0.0, 2.0, (2, 10, 60, 60))
     filled = rng.random(log_odds.shape) < expit(log_odds)
     loud, everywhere = (2 * log_odds).astype(np.float32), np.ones(log_odds.shape[1:], bool)
-    reliability = CellReliability.of([count_cells(loud[0], filled[0], everywhere)])
+    reliability = cell_reliability.CellReliability.of([cell_reliability.count_cells(loud[0], filled[0], everywhere)])
     stated = reliability.of_cells(loud[1])
     for low in np.arange(0.0, 1.0, 0.1):
         of_bin = (stated >= low) & (stated < low + 0.1)
@@ -83,15 +75,17 @@ def test_evidence_that_counts_twice_is_calibrated() -> None:
 
 
 def test_nothing_counted_is_a_half() -> None:
-    np.testing.assert_array_equal(CellReliability.of([]).probability, 0.5)
-    empty = CellCounts(np.zeros(len(LOG_ODDS_KNOTS)), np.zeros(len(LOG_ODDS_KNOTS)))
-    np.testing.assert_array_equal(CellReliability.of([empty]).probability, 0.5)
+    np.testing.assert_array_equal(cell_reliability.CellReliability.of([]).probability, 0.5)
+    empty = cell_reliability.CellCounts(
+        np.zeros(len(cell_reliability.LOG_ODDS_KNOTS)), np.zeros(len(cell_reliability.LOG_ODDS_KNOTS))
+    )
+    np.testing.assert_array_equal(cell_reliability.CellReliability.of([empty]).probability, 0.5)
 
 
 def test_cells_that_anybody_fills() -> None:
     both = people((0.3, 0.3, 1.5), (-0.4, 0.0, 1.9))
-    apart = [filled_cells(GRID, both[k : k + 1]) for k in range(2)]
-    np.testing.assert_array_equal(filled_cells(GRID, both), apart[0] | apart[1])
+    apart = [cell_reliability.filled_cells(GRID, both[k : k + 1]) for k in range(2)]
+    np.testing.assert_array_equal(cell_reliability.filled_cells(GRID, both), apart[0] | apart[1])
     assert [cells.any((1, 2)).sum() for cells in apart] == [8, 10]
 
 
@@ -99,11 +93,10 @@ def test_cells_in_doubt() -> None:
     """Seen cells: all within a metre of somebody, and elsewhere those of little evidence."""
     log_odds = np.full(GRID.shape, -9.0, np.float32)
     log_odds[0, 0, :2] = 1.0, np.nan
-    found = doubtful_cells(GRID, log_odds, people((0.9, 0.9, 1.7)))
-    assert found[0, 0, :3].tolist() == [True, False, False]
-    assert found[:, -1, -1].all()
+    found = cell_reliability.doubtful_cells(GRID, log_odds, people((0.9, 0.9, 1.7)))
+    assert found[0, 0, :3].tolist() == [True, False, False] and found[:, -1, -1].all()
     log_odds[:, -1, -1] = np.nan
-    assert not doubtful_cells(GRID, log_odds, people((0.9, 0.9, 1.7)))[:, -1, -1].any()
+    assert not cell_reliability.doubtful_cells(GRID, log_odds, people((0.9, 0.9, 1.7)))[:, -1, -1].any()
 
 
 def test_of_a_run_file(tmp_path: Path) -> None:
@@ -112,8 +105,7 @@ def test_of_a_run_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.isnan(probability), np.isnan(log_odds))
     seen = ~np.isnan(log_odds)
     order = np.argsort(log_odds[seen])
-    assert (np.diff(probability[seen][order]) >= 0).all()
-    assert 0 < probability[seen].mean() < 1
+    assert (np.diff(probability[seen][order]) >= 0).all() and 0 < probability[seen].mean() < 1
 
 
 def test_sizes_that_the_evidence_left_open_are_unmeasured() -> None:
@@ -139,5 +131,4 @@ def test_points_have_the_distance_of_their_cell() -> None:
     (left, right), (low, high) = grid.x, grid.y
     out = np.array([[left - 0.01, 0], [right + 0.01, 0], [0, low - 0.01], [0, high + 0.01], [-1e30, 1e30]])
     np.testing.assert_array_equal(border.away(out), 0.0)
-    assert border.away(out[:0]).shape == (0,)
-    assert border.distance.max() > 1.0
+    assert border.away(out[:0]).shape == (0,) and border.distance.max() > 1.0

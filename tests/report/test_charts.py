@@ -4,28 +4,18 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_files import table_of, trajectory_of
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
 from stseg.records.point_probability import point_probability
 from stseg.records.tables import TRACK, TRAJECTORY, Tracks
+from stseg.reporting import run_statistics
 from stseg.reporting.charts import clock_time, people_chart, track_chart
 from stseg.reporting.pictures.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
 from stseg.reporting.pictures.plan_map import PlanMap
-from stseg.reporting.run_statistics import (
-    Span,
-    busiest_minutes,
-    doubtful_stretches,
-    exchange_chances,
-    ground_by_views,
-    mean_certainty,
-    people_by_hour,
-    people_per_minute,
-)
 
 
 def steps(svg: str, name: str) -> list[tuple[float, float]]:
@@ -36,29 +26,27 @@ def steps(svg: str, name: str) -> list[tuple[float, float]]:
 
 def test_the_chart_counts_people() -> None:
     table = trajectory_of((10, 1, 0, 0), (11, 1, 0, 0), (11, 2, 0, 0))
-    found = steps(people_chart(Span(10, 13, 5.0), table, None), "line")
+    found = steps(people_chart(run_statistics.Span(10, 13, 5.0), table, None), "line")
     (one, two, none) = (v for v, _ in found)
-    assert two < one < none
-    assert none - one == pytest.approx(one - two, abs=0.2)
+    assert two < one < none and none - one == pytest.approx(one - two, abs=0.2)
 
 
 def test_the_chart_of_a_long_recording_stays_small() -> None:
     table = table_of(TRAJECTORY, frame=np.arange(20000))
-    assert len(steps(people_chart(Span(0, 20000, 25.0), table, None), "line")) <= 900
+    assert len(steps(people_chart(run_statistics.Span(0, 20000, 25.0), table, None), "line")) <= 900
 
 
 def test_sparse_truth_holds_until_the_next_frame_that_it_knows() -> None:
     truth = trajectory_of((0, 1, 0, 0), (3, 1, 0, 0), (3, 2, 0, 0))
-    heights = [v for v, _ in steps(people_chart(Span(0, 6, 5.0), trajectory_of(), truth), "truth")]
+    heights = [v for v, _ in steps(people_chart(run_statistics.Span(0, 6, 5.0), trajectory_of(), truth), "truth")]
     assert heights[0] == heights[1] == heights[2] > heights[3] == heights[4] == heights[5]
 
 
-@settings(max_examples=examples(30))
-@given(st.lists(st.tuples(st.integers(0, 900), st.integers(0, 90)), max_size=40))
+@drawn(30, st.lists(st.tuples(st.integers(0, 900), st.integers(0, 90)), max_size=40))
 def test_bars_of_tracks_never_overlap(spans: list[tuple[int, int]]) -> None:
     first, length = np.reshape(spans, (-1, 2)).T
     tracks = table_of(TRACK, id=np.arange(len(spans)) + 1, first=first, last=first + length)
-    svg = track_chart(Span(0, 1000, 5.0), tracks, [])
+    svg = track_chart(run_statistics.Span(0, 1000, 5.0), tracks, [])
     bars = [tuple(map(float, bar)) for bar in re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)"', svg)]
     assert len(bars) == len(spans)
     for k, (u, v, width) in enumerate(bars):
@@ -70,14 +58,15 @@ def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
     rows = trajectory_of(*((frame, track, 0, 0) for track in (1, 2) for frame in range(10)), (30, 2, 0, 0))
     rows["score"], rows["views"] = 8.0, 9
     rows["score"][[3, 4, 7, 12, 20]] = 0.0
-    found = doubtful_stretches(rows[::-1])
+    found = run_statistics.doubtful_stretches(rows[::-1])
     assert [(one.track, one.first, one.last) for one in found] == [(1, 3, 4), (1, 7, 7), (2, 2, 2), (2, 30, 30)]
     assert [one.certainty for one in found] == pytest.approx([0.5] * 4, rel=2e-3)
     tracks = table_of(TRACK, id=(1, 2, 3), last=(9, 30, 5))
-    np.testing.assert_allclose(mean_certainty(rows, tracks), 0.999 * np.array([0.85, 1 - 1 / 11, np.nan]), atol=1e-3)
-    svg = track_chart(Span(0, 40, 5.0), tracks, found)
-    assert svg.count('class="pale"') == 4
-    assert "track 1, frames 3 to 4: 50 % certain" in svg
+    np.testing.assert_allclose(
+        run_statistics.mean_certainty(rows, tracks), 0.999 * np.array([0.85, 1 - 1 / 11, np.nan]), atol=1e-3
+    )
+    svg = track_chart(run_statistics.Span(0, 40, 5.0), tracks, found)
+    assert svg.count('class="pale"') == 4 and "track 1, frames 3 to 4: 50 % certain" in svg
 
 
 def test_points_of_few_views_are_less_certain_by_any_score() -> None:
@@ -95,9 +84,9 @@ def test_exchanges_are_likelier_near_ends_and_after_absence() -> None:
     away = [(frame, 5, 5.0, 4.0) for frame in (*range(10), *range(30, 40))]
     rows = trajectory_of(*walks, *late, *at_border, *away)
     tracks = Tracks(rows).summary()
-    chances = exchange_chances(rows, tracks, 10.0, np.array([[0.0, -5.0], [10.0, 5.0]]))
+    chances = run_statistics.exchange_chances(rows, tracks, 10.0, np.array([[0.0, -5.0], [10.0, 5.0]]))
     assert chances[1] == chances[2] == chances[3] < chances[0] < chances[4] < 1
-    assert exchange_chances(rows[:0], tracks[:0], 10.0, np.zeros((2, 2))).shape == (0,)
+    assert run_statistics.exchange_chances(rows[:0], tracks[:0], 10.0, np.zeros((2, 2))).shape == (0,)
 
 
 def test_clock_times() -> None:
@@ -110,33 +99,32 @@ def stays(*tracks: tuple[int, int]) -> Rows:
 
 
 def test_people_by_the_hour() -> None:
-    span = Span(100, 100 + 5400, 1.0)
-    first, second = people_by_hour(span, stays((100, 1900), (1000, 4600)))
+    span = run_statistics.Span(100, 100 + 5400, 1.0)
+    first, second = run_statistics.people_by_hour(span, stays((100, 1900), (1000, 4600)))
     assert (first.first, first.stop, first.most, first.come) == (100, 3700, 2, 2)
     assert first.mean == (1800 + 2700) / 3600
     assert (second.first, second.stop, second.most, second.come, second.mean) == (3700, 5500, 1, 0, 0.5)
 
 
 def test_the_busiest_minutes_are_in_order_of_time() -> None:
-    span = Span(0, 600, 1.0)
-    found = busiest_minutes(span, stays((300, 360), (300, 360), (60, 120), (480, 500)))
+    span = run_statistics.Span(0, 600, 1.0)
+    found = run_statistics.busiest_minutes(span, stays((300, 360), (300, 360), (60, 120), (480, 500)))
     assert [(one.first, one.mean, one.come) for one in found] == [(60, 1.0, 1), (300, 2.0, 2), (480, 1 / 3, 1)]
-    assert busiest_minutes(span, stays((0, 0))) == []
+    assert run_statistics.busiest_minutes(span, stays((0, 0))) == []
 
 
 def test_each_minute_has_its_own_mean() -> None:
     frames = np.arange(30, 30 + 90)  # a minute and a half, one frame a second
     rows = table_of(TRAJECTORY, frame=np.concatenate([np.arange(30, 90), frames]))
-    np.testing.assert_allclose(people_per_minute(frames, rows, 1.0), [2, 1])
-    assert people_per_minute(frames[:0], rows[:0], 1.0).shape == (0,)
+    np.testing.assert_allclose(run_statistics.people_per_minute(frames, rows, 1.0), [2, 1])
+    assert run_statistics.people_per_minute(frames[:0], rows[:0], 1.0).shape == (0,)
 
 
-@settings(max_examples=examples(25))
-@given(st.lists(st.integers(0, 199), max_size=60), st.floats(0.2, 3))
+@drawn(25, st.lists(st.integers(0, 199), max_size=60), st.floats(0.2, 3))
 def test_minutes_add_up_to_all_people(drawn: list[int], frame_rate: float) -> None:
     frames, rows = np.arange(200), table_of(TRAJECTORY, frame=drawn)
     length = max(1, round(60 * frame_rate))
-    minutes = people_per_minute(frames, rows, frame_rate)
+    minutes = run_statistics.people_per_minute(frames, rows, frame_rate)
     lengths = np.diff([*range(0, 200, length), 200])
     np.testing.assert_allclose(minutes @ lengths, len(drawn))
 
@@ -146,7 +134,7 @@ def test_shares_of_the_ground_that_counts() -> None:
     views[1, 0] = 2
     views[0, 1, 0] = 1
     inside = np.array([[True, True, False], [True, True, False]])
-    np.testing.assert_allclose(ground_by_views(views, inside, 2), [0.25, 0.25, 0.5])
+    np.testing.assert_allclose(run_statistics.ground_by_views(views, inside, 2), [0.25, 0.25, 0.5])
 
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
@@ -156,8 +144,7 @@ BINS = Bins((0.0, 4.0), (-1.0, 2.0), 1.0)
 
 def test_density_is_people_a_square_metre() -> None:
     found = density(BINS, trajectory_of((0, 1, 0.5, -0.5), (1, 1, 0.6, -0.4), (1, 2, 3.9, 1.9), (1, 3, 9, 9)), 2)
-    assert found.shape == (3, 4)
-    assert (found[0, 0], found[2, 3], found.sum()) == (1, 0.5, 1.5)
+    assert found.shape == (3, 4) and (found[0, 0], found[2, 3], found.sum()) == (1, 0.5, 1.5)
     assert density(Bins(BINS.x, BINS.y, 0.5), trajectory_of((0, 1, 0.2, -0.9)), 1)[0, 0] == 4
 
 
@@ -167,12 +154,10 @@ def test_a_return_begins_another_stay() -> None:
     found = dwell(BINS, trajectory_of(*((frame, 1, *place) for frame, place in enumerate(walk))), 2.0)
     assert (found[0, 0], found[0, 2]) == (6 / 2 / 2.0, 2 / 2 / 2.0)  # frames a stay at two frames a second
     two = trajectory_of((0, 1, *home), (1, 1, *home), (0, 2, *home), (1, 2, *home))
-    assert dwell(BINS, two, 2.0)[0, 0] == 1
-    assert not dwell(BINS, trajectory_of(), 2.0).any()
+    assert dwell(BINS, two, 2.0)[0, 0] == 1 and not dwell(BINS, trajectory_of(), 2.0).any()
 
 
-@settings(max_examples=examples(30))
-@given(st.lists(st.tuples(st.floats(-1, 5), st.floats(-2, 3)), max_size=50))
+@drawn(30, st.lists(st.tuples(st.floats(-1, 5), st.floats(-2, 3)), max_size=50))
 def test_every_row_on_the_ground_is_counted_once(places: list[tuple[float, float]]) -> None:
     rows = trajectory_of(*((k, 1, x, y) for k, (x, y) in enumerate(places)))
     inside = (rows["x"] >= 0) & (rows["x"] < 4) & (rows["y"] >= -1) & (rows["y"] < 2)
@@ -180,8 +165,7 @@ def test_every_row_on_the_ground_is_counted_once(places: list[tuple[float, float
 
 
 def test_bins_are_round_and_never_finer_than_cells() -> None:
-    assert Bins.of(GRID).side == 0.5
-    assert Bins.of(Grid((0, 5), (0, 5), 0.1)).side == 0.25
+    assert Bins.of(GRID).side == 0.5 and Bins.of(Grid((0, 5), (0, 5), 0.1)).side == 0.25
     assert Bins.of(Grid((0, 30), (0, 5), 0.1)).side == 1.0
 
 

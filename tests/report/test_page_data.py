@@ -9,9 +9,8 @@ import cv2
 import numpy as np
 import pytest
 import run_files
-from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import AnyArray, Bytes, Labels, Rows, Singles
 from stseg.commands.report import report
@@ -72,8 +71,7 @@ def test_large_ground_is_shown_by_the_greatest_of_some_cells() -> None:
     np.testing.assert_array_equal(coarse(log_odds, 1), log_odds)
 
 
-@settings(max_examples=examples(30))
-@given(st.integers(1, 60), st.integers(2, 20))
+@drawn(30, st.integers(1, 60), st.integers(2, 20))
 def test_spread_frames_reach_from_end_to_end(count: int, most: int) -> None:
     frames = np.arange(10, 10 + count)
     chosen = evenly_spaced(frames, most)

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 import run_files
 import strategies
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_files import trajectory_of
 from scenes import looking
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import AnyArray, Boxes, Bytes, Rows
 from stseg.geometry import Camera, Grid, Rig
@@ -133,8 +132,7 @@ def test_a_camera_that_looks_down_has_a_place_but_no_wedge(tmp_path: Path) -> No
     assert picture.shape[2] == 3 and np.isfinite(place).all()
 
 
-@settings(max_examples=15)
-@given(strategies.rigs())
+@drawn(45, strategies.rigs())
 def test_any_rig_has_a_plan(rig: Rig) -> None:
     middle = rig.grid.ground[rig.grid.inside()].mean(axis=0)
     picture = plan_view(rig, trajectory_of((0, 3, *middle.tolist())), width=700, height=600)
@@ -159,8 +157,7 @@ def test_names_of_cameras_are_not_on_the_numbers_of_the_axes() -> None:
     assert not changed[: round(bottom), : round(left) - 10].any()
 
 
-@settings(max_examples=examples(30))
-@given(st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), max_size=12))
+@drawn(30, st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), max_size=12))
 def test_labels_stay_on_the_canvas(points: list[tuple[float, float]]) -> None:
     centres = place_labels(np.array(points).reshape(-1, 2), [(30, 16)] * len(points), (0, 0, 400, 300))
     assert centres.shape == (len(points), 2)
@@ -192,8 +189,7 @@ def test_a_pillar_is_as_tall_as_its_person() -> None:
     assert abs(body[:, 0].mean() - foot[0]) < 3
 
 
-@settings(max_examples=examples(25))
-@given(strategies.cameras(), st.floats(1.2, 2.0))
+@drawn(25, strategies.cameras(), st.floats(1.2, 2.0))
 def test_the_axis_of_a_body_is_inside_its_outline(camera: Camera, height: float) -> None:
     view = OverlayView(camera, 640)
     polygons = pillar_outline(view, np.zeros(2), height)
@@ -213,8 +209,7 @@ def test_people_behind_the_camera_are_left_out() -> None:
 def test_people_outside_the_picture_leave_no_trace_in_it() -> None:
     camera = front_camera()
     outside = trajectory_of((0, 1, 9.0, 0.0), (1, 1, 9.0, 0.2))
-    pixel = OverlayView(camera, 640).pixel(np.array([9.0, 0.0]), 0.0)
-    assert 660 < pixel[0] < 1200
+    assert 660 < OverlayView(camera, 640).pixel(np.array([9.0, 0.0]), 0.0)[0] < 1200
     one, other = (overlay(camera, GRID, None, rows, 1, width=640) for rows in (outside, outside[:0]))
     np.testing.assert_array_equal(one, other)
 
@@ -310,9 +305,7 @@ def test_the_nearer_thread_passes_in_front() -> None:
     picture = spacetime_picture(GRID, trajectory_of(*front, *far), 5.0, width=600, height=700)
     block = Block.fit(GRID, 0, 20, (600, 700))
     paths = [block.pixel([row[2:] + row[:1] for row in path]) for path in (front, far)]
-    fine = [
-        np.stack([np.interp(np.linspace(0, 20, 2001), np.arange(21), axis) for axis in path.T], -1) for path in paths
-    ]
+    fine = [np.stack([np.interp(np.arange(2001) / 100, np.arange(21), axis) for axis in path.T], -1) for path in paths]
     distances = np.linalg.norm(fine[0][:, None] - fine[1][None, ::4], axis=-1)
     crossing = fine[0][np.unravel_index(distances.argmin(), distances.shape)[0]]
     assert distances.min() < 1 and at(picture, crossing) == track_colour(1)

@@ -1,28 +1,38 @@
-"""The report of a run and its warnings."""
+"""The report: one page that holds everything, its pictures beside it, and a film of what it tells."""
 
 import base64
 import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import cv2
 import h5py
 import numpy as np
 import pytest
 import run_files
+from browser import CHROMIUM, chromium
+from cases import cases
 from numpy.typing import ArrayLike
-from refusals import refused
+from refusals import Command, refused
+from scenes import looking
 
 from stseg.arrays import AnyArray, Bytes, Rows
+from stseg.commands.main import main
 from stseg.commands.report import report
 from stseg.config import BodyConfig
 from stseg.errors import ConfigError, FormatError, OutputError, SourceError
-from stseg.io.recording.recording import CameraSource, Source
+from stseg.geometry import Camera, Grid, Rig
+from stseg.io.outputs.video_writer import write_film
+from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.layout import ghost_type
 from stseg.io.runfile.runs import RunWriter
 from stseg.records.ghost_reasons import DENIED, OTHERS, TOO_LITTLE, ghost_reasons
 from stseg.records.tables import EVENT, RATES, TRAJECTORY, Tracks
+from stseg.reporting.figures import RunFilm
+from stseg.reporting.pictures.colours import track_colour
+from stseg.reporting.pictures.overlay import OverlayView
 from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 
@@ -137,9 +147,7 @@ def test_without_the_flag_no_stream_is_even_opened(run_path: Path, tmp_path: Pat
     assert not (tmp_path / "b.html").exists()
 
 
-def test_pictures_are_written_beside_the_page(
-    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_pictures_stand_beside_the_page(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     report(run_path, output=tmp_path / "a.html", pictures=tmp_path / "one", frame=(11,))
     maps = {"plan", "spacetime", "density", "dwell", "flow", "ghosts", "blind"}
     plain = maps | {"slices", "marginal", "overlay_left", "overlay_right"}
@@ -164,9 +172,6 @@ def test_truth_adds_scores_of_the_run_s_frames(run_path: Path, tmp_path: Path) -
 
 def test_errors_of_the_user_are_reported(run_path: Path, tmp_path: Path) -> None:
     refused(ConfigError, r"--frame.*found 99.*10 to 15", report, run_path, output=tmp_path / "a.html", frame=(99,))
-    (tmp_path / "old.html").write_text("old")
-    refused(OutputError, "overwrite", report, run_path, output=tmp_path / "old.html")
-    refused(OutputError, "did not make", report, run_path, output=tmp_path / "old.html", overwrite=True)
     (tmp_path / "old.html").write_text("old, made by stseg")
     assert not page_of(run_path, tmp_path / "old.html", overwrite=True, frame=(11,)).startswith("old")
     refused(OutputError, "found", report, run_path, output=tmp_path / "a.html", pictures=run_path, frame=(11,))
@@ -201,8 +206,7 @@ def test_ghosts_have_the_reason_that_weighed_most() -> None:
     found = ghost_reasons(np.concatenate([people, ghosts]))
     assert found.reason.tolist() == [DENIED, OTHERS, TOO_LITTLE, OTHERS]
     assert found.denies.tolist() == [[True, False, False], [False] * 3, [False] * 3, [True, False, False]]
-    assert found.counts() == [1, 2, 1]
-    assert len(found.ghosts) == 4
+    assert found.counts() == [1, 2, 1] and len(found.ghosts) == 4
     none = ghost_reasons(candidates_of([], [], np.zeros((0, 3))))
     assert (none.counts(), none.denies.shape) == ([0, 0, 0], (0, 3))
 
@@ -249,3 +253,118 @@ def test_wide_bodies_are_reported_with_the_expected_width() -> None:
 def test_a_view_of_torn_bodies_is_named() -> None:
     (warning,) = body_warnings(("a", "b"), bodies_of(1.7, 0.42), rates_of(0.15, 0.38), BodyConfig())
     assert warning.startswith("view b misses 38 %")
+
+
+def front_camera(name: str, x: float) -> Camera:
+    """Three metres above y = -4, looking along y and down."""
+    return looking(name, (x, -4.0, 3.0), (x, -4.0 + 3.0 / np.tan(0.4), 0.0), (320, 240), 250.0)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    """Two cameras with frames of one vivid colour."""
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for frame in range(16):
+        cv2.imwrite(str(folder / f"{frame:03d}.png"), np.full((240, 320, 3), VIVID, np.uint8))
+    rig = Rig("hall", 5.0, Grid((0, 4), (-1, 2), 0.5, 1.8, 3), (front_camera("left", 1), front_camera("right", 3)))
+    return Recording(tmp_path / "rig.toml", rig, (CameraSource(Source("images", folder)),) * 2)
+
+
+def walk() -> Rows:
+    """One person who crosses the ground in frames 10 to 15."""
+    return run_files.table_of(TRAJECTORY, frame=run_files.FRAMES, id=1, x=np.linspace(1.4, 2.6, 6), y=0.5, height=1.7)
+
+
+@pytest.fixture
+def walk_path(recording: Recording, tmp_path: Path) -> Path:
+    return run_files.write_run(tmp_path / "run.h5", recording, walk())
+
+
+def frames_of(path: Path) -> list[Bytes]:
+    film = cv2.VideoCapture(str(path))
+    return [np.asarray(frame, np.uint8) for _, frame in iter(film.read, (False, None))]
+
+
+def is_close(pixel: Bytes, colour: tuple[int, int, int], tolerance: float) -> bool:
+    return bool(np.abs(pixel.astype(int) - colour).max() <= tolerance)
+
+
+def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -> None:
+    rig = recording.rig
+    film = RunFilm(rig, np.full(rig.grid.shape, 2, np.uint8), walk())
+    pictures = [film.picture(frame, (None, None)) for frame in (10, 15)]
+    assert all(picture.shape == (film.size[1], film.size[0], 3) for picture in pictures)
+    assert film.size[0] % 2 == film.size[1] % 2 == 0
+    for picture, row in zip(pictures, walk()[[0, -1]], strict=True):
+        for k, camera in enumerate(rig.cameras):
+            u, v = np.rint(OverlayView(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)).astype(int)
+            assert tuple(picture[v, u + 640 * k].tolist()) == track_colour(1)
+    assert not np.array_equal(pictures[0][:, 1280:], pictures[1][:, 1280:])
+    assert (pictures[1][:, 1280:] == track_colour(1)).all(axis=-1).any()
+
+
+def test_the_film_has_the_frames_that_were_asked_for(walk_path: Path, tmp_path: Path, stdout: Command) -> None:
+    assert "a.mp4: 6 frames" in stdout("report", walk_path, "--video", tmp_path / "a.mp4", "--camera-images")
+    whole = frames_of(tmp_path / "a.mp4")
+    assert len(whole) == 6
+    darkened = tuple(round(0.85 * tone) for tone in VIVID)
+    assert is_close(whole[0][400, 20], (darkened[0], darkened[1], darkened[2]), 12)
+    row = walk()[0]
+    body = np.rint(OverlayView(front_camera("left", 1), 640).pixel(np.array([row["x"], row["y"]]), 0.9)).astype(int)
+    assert not is_close(whole[0][body[1], body[0]], (darkened[0], darkened[1], darkened[2]), 30)  # the pillar
+    assert not list(tmp_path.glob("*.part*"))
+
+
+def test_without_the_flag_a_film_holds_no_camera_pixel(walk_path: Path, tmp_path: Path) -> None:
+    for path in (tmp_path / "frames").iterdir():
+        path.unlink()
+    assert main(["report", str(walk_path), "--video", str(tmp_path / "a.mp4")]) == 0
+    darkened = np.array([0.85 * tone for tone in VIVID])
+    assert not any((np.abs(frame - darkened).max(axis=-1) < 40).any() for frame in frames_of(tmp_path / "a.mp4"))
+    assert main(["report", str(walk_path), "--video", str(tmp_path / "b.mp4"), "--camera-images"]) == 2
+    assert not (tmp_path / "b.mp4").exists()
+
+
+@cases()
+def test_slips_are_told_before_any_work(
+    walk_path: Path, monkeypatch: pytest.MonkeyPatch, refusal: Command, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(walk_path.parent)
+    before = set(walk_path.parent.iterdir())
+    assert message in refusal("report", walk_path, *arguments) and set(walk_path.parent.iterdir()) == before
+
+
+def test_an_older_film_is_replaced(walk_path: Path, tmp_path: Path) -> None:
+    for frames in ("12:14", "12:13"):
+        words = ["report", str(walk_path), "--video", str(tmp_path / "a.mp4"), "--frames", frames, "--overwrite"]
+        assert main(words) == 0
+        assert len(frames_of(tmp_path / "a.mp4")) == int(frames[-1]) - 2
+
+
+def test_what_goes_wrong_on_the_way_leaves_no_film(tmp_path: Path) -> None:
+    broken = Mock(side_effect=OutputError("x", "", "trouble", "none"))
+    refused(OutputError, "trouble", write_film, tmp_path / "a.mp4", (broken(k) for k in range(1)), 5.0, False)
+    refused(OutputError, "empty", write_film, tmp_path / "a.mp4", [], 5.0, False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_rig_of_one_camera_and_of_many_have_films(recording: Recording) -> None:
+    sizes = []
+    for count in (1, 7):
+        cameras = tuple(replace(front_camera("c", 2), name=f"c{k}") for k in range(count))
+        rig = replace(recording.rig, cameras=cameras)
+        film = RunFilm(rig, np.zeros(rig.grid.shape, np.uint8), walk()[:0])
+        assert film.picture(3, (None,) * count).shape == (film.size[1], film.size[0], 3)
+        sizes.append(film.size)
+    assert sizes[0][0] < sizes[1][0] and sizes[1][0] < 3000
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
+def test_a_browser_plays_the_film(walk_path: Path, tmp_path: Path) -> None:
+    assert main(["report", str(walk_path), "--video", str(tmp_path / "a.mp4"), "--frames", "10:12"]) == 0
+    (tmp_path / "film.html").write_text("<video src='a.mp4' muted></video>")
+    with chromium(tmp_path / "profile") as page:
+        page.open(tmp_path / "film.html")
+        page.wait_for("(v => v.error || v.readyState > 1)(document.querySelector('video'))")
+        assert page.ask("(v => [v.error && v.error.code, v.duration])(document.querySelector('video'))") == [None, 0.4]

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example
 from hypothesis import strategies as st
-from strategies import examples, numbers
+from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Floats, Labels, Singles
 from stseg.geometry import Grid
@@ -37,10 +37,8 @@ def test_cells_near_a_person_move_with_them() -> None:
     now = np.array([[0.55, 0.55], [1.45, 0.95]])
     then = np.array([[1.25, 0.85], [0.85, 0.45]])
     motion = motion_field(now, then, np.array([4, 7]), np.array([7, 4]), 0.25, GRID.cell, GRID.ground)
-    assert motion[5, 5].tolist() == [-1, 3]
-    assert motion[9, 14].tolist() == [-1, -2]
-    assert motion[6, 6].tolist() == [-1, 3]
-    assert not motion[0, 0].any()
+    assert motion[5, 5].tolist() == [-1, 3] and motion[9, 14].tolist() == [-1, -2]
+    assert motion[6, 6].tolist() == [-1, 3] and not motion[0, 0].any()
     away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - now, -1, 0)).min(2)
     np.testing.assert_array_equal(motion.any(2), away <= 0.25)
 
@@ -50,8 +48,7 @@ def test_a_track_not_detected_again_does_not_move() -> None:
         here, there = np.full((len(now), 2), 0.55), np.full((len(then), 2), 1.0)
         tracks = np.array(now, np.int64), np.array(then, np.int64)
         motion = motion_field(here, there, *tracks, 0.3, GRID.cell, GRID.ground)
-        assert motion.shape == (15, 20, 2)
-        assert not motion.any()
+        assert motion.shape == (15, 20, 2) and not motion.any()
 
 
 def disc(*places: tuple[float, float], radius: float = 0.22, tall: int = 3) -> Flags:
@@ -83,8 +80,7 @@ def test_a_person_is_a_blob() -> None:
 def test_touching_people_are_two_blobs() -> None:
     left, right = (0.65, 0.75), (1.05, 0.75)
     found = blobs_of(disc(left, right), right, left)
-    assert sorted(found.person.tolist()) == [0, 1]
-    assert found.touches.tolist() == [[0, 1]]
+    assert sorted(found.person.tolist()) == [0, 1] and found.touches.tolist() == [[0, 1]]
     for blob, who in enumerate(found.person):
         x = (right, left)[who][0]
         cells = GRID.ground[found.cells == blob + 1]
@@ -101,13 +97,10 @@ def test_a_component_without_a_detection_is_kept() -> None:
 
 def test_a_detection_without_cells_is_a_blob_without_extent() -> None:
     found = blobs_of(disc((0.45, 0.75)), (0.45, 0.75), (1.8, 0.2))
-    assert found.person.tolist() == [0, 1]
-    assert found.track.tolist() == [11, 12]
-    assert found.ground[1].tolist() == [1.8, 0.2]
-    assert found.extent[0] > found.extent[1] == 0
+    assert found.person.tolist() == [0, 1] and found.track.tolist() == [11, 12]
+    assert found.ground[1].tolist() == [1.8, 0.2] and found.extent[0] > found.extent[1] == 0
     empty = blobs_of(np.zeros(GRID.shape, bool), (0.45, 0.75))
-    assert empty.person.tolist() == [0]
-    assert not empty.cells.any()
+    assert empty.person.tolist() == [0] and not empty.cells.any()
     assert empty.touches.shape == (0, 2)
 
 
@@ -117,8 +110,7 @@ def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
     label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
     nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
     found = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, GroundPatches.whole(GRID))
-    assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED]
-    assert found.person.tolist() == [-1, -1, -1]
+    assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED] and found.person.tolist() == [-1, -1, -1]
     np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
 
 
@@ -141,8 +133,7 @@ def test_a_blob_holds_the_detection_inside_it() -> None:
         assert found.person.tolist() == person
 
 
-@settings(max_examples=examples(40))
-@given(st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
+@drawn(40, st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
 @example([(2.0, 0.0)], 0)
 @example([(1.0, 0.0)], 767)
 def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]], seed: int) -> None:
@@ -170,8 +161,7 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
     assert found.extent.sum() == pytest.approx((label != 0).any(0).sum() * 0.01)
 
 
-@given(seed=st.integers(0, 2**16))
-@settings(max_examples=examples(20))
+@drawn(20, seed=st.integers(0, 2**16))
 def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
     random = np.random.default_rng(seed)
     label = random.choice(np.array([0, 0, UNASSIGNED, 2, 5, 9], np.int32), GRID.shape)

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_expansion as reference
-from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import examples, numbers
+from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.config import MotionConfig, SegmentationConfig, TrackingConfig
@@ -39,8 +38,7 @@ def random_window(seed: int, shape: tuple[int, ...]) -> GridEnergy:
     return GridEnergy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, successor_cells(motion))
 
 
-@settings(max_examples=examples(25))
-@given(st.integers(0, 999), st.sampled_from([(3, 2, 3, 4), (2, 3, 4, 3), (1, 2, 3, 3), (4, 1, 1, 5)]))
+@drawn(25, st.integers(0, 999), st.sampled_from([(3, 2, 3, 4), (2, 3, 4, 3), (1, 2, 3, 3), (4, 1, 1, 5)]))
 def test_a_subgraph_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_window(seed, shape)
     inside = np.random.default_rng(seed).random(shape) < 0.6
@@ -79,13 +77,10 @@ def places_at(
     size = (frames, len(tracks))
     ground = np.tile(np.array(tracks, float).reshape(-1, 2), (frames, 1, 1))
     covariance = np.tile(np.eye(2) * spread**2, (*size, 1, 1))
-    return PredictedPlaces(
-        np.arange(1, len(tracks) + 1), np.ones(size, bool), ground, covariance, np.full(size, height)
-    )
+    return PredictedPlaces(1 + np.arange(len(tracks)), np.ones(size, bool), ground, covariance, np.full(size, height))
 
 
-@settings(max_examples=examples(40))
-@given(numbers(0.6, 1.2), numbers(0.4, 1.0), numbers(0, 2.2), numbers(0.01, 0.3), st.booleans())
+@drawn(40, numbers(0.6, 1.2), numbers(0.4, 1.0), numbers(0, 2.2), numbers(0.01, 0.3), st.booleans())
 def test_shares_by_definition(x: float, y: float, height: float, spread: float, gone: bool) -> None:
     places = places_at((0.8, 0.7), (1.1, 0.6), spread=spread)
     places.expected[0, 1] = not gone
@@ -106,8 +101,7 @@ def share_at(places: PredictedPlaces, *cells: tuple[float, float, float], appear
 def test_tracks_beyond_the_gate_are_inadmissible() -> None:
     share = share_at(places_at((0.5, 0.7), (1.9, 0.7)), (0.5, 0.7, 1.0), (1.9, 0.8, 1.0), (1.2, 0.0, 1.0))
     assert (share > 0).tolist() == [[True, False, True], [False, True, True], [False, False, True]]
-    assert share[2, -1] == 1.0
-    assert share[0, 0] > 0.95
+    assert share[2, -1] == 1.0 and share[0, 0] > 0.95
 
 
 def test_appearance_separates_tracks_in_one_place() -> None:
@@ -160,8 +154,7 @@ def meeting(frames: int = 5) -> Floats:
 
 def walking(tracks: Floats) -> PredictedPlaces:
     """Places of tracks that are detected in all frames."""
-    still = places_at(*tracks[0], frames=len(tracks))
-    return replace(still, ground=tracks)
+    return replace(places_at(*tracks[0], frames=len(tracks)), ground=tracks)
 
 
 def test_touching_people_are_divided_as_in_the_truth() -> None:
@@ -172,8 +165,7 @@ def test_touching_people_are_divided_as_in_the_truth() -> None:
     assert subset(energy, occupied).components().max() == 0  # one piece of space and time
     assert division.cells == occupied.sum()
     both = (truth > 0) & (division.label > 0)
-    assert (division.label[both] == truth[both]).mean() > 0.98
-    assert both.sum() > 0.98 * (truth > 0).sum()
+    assert (division.label[both] == truth[both]).mean() > 0.98 and both.sum() > 0.98 * (truth > 0).sum()
     assert not division.label[~occupied].any()
 
 
@@ -201,8 +193,7 @@ def test_separate_tracks_need_no_expansion() -> None:
     tracks = meeting() + np.array([[-0.6, 0.0], [0.6, 0.0]])
     truth = bodies(tracks)
     occupied, division = divided(window_of(truth), walking(tracks))
-    assert division.cells == 0
-    assert (division.label[occupied] != 0).all()
+    assert division.cells == 0 and (division.label[occupied] != 0).all()
     both = (truth > 0) & occupied
     np.testing.assert_array_equal(division.label[both], truth[both])
 
@@ -224,8 +215,7 @@ def test_a_track_detected_elsewhere_has_no_cells_here() -> None:
     gone = tracks.copy()
     gone[2, 1] = 3.0, 0.7
     _, division = divided(energy, walking(gone))
-    assert set(np.unique(division.label[2])) <= {0, 1, UNASSIGNED}
-    assert 2 in division.label[1]
+    assert set(np.unique(division.label[2])) <= {0, 1, UNASSIGNED} and 2 in division.label[1]
 
 
 def test_an_empty_window() -> None:
@@ -275,8 +265,7 @@ def test_places_between_and_after_detections() -> None:
     np.testing.assert_allclose(places.ground[4:7, 0], [[0.0, 5.0]] * 3)
     spread = places.covariance[:, 1, 0, 0]
     assert spread[2] == spread[6] == pytest.approx(0.01)
-    assert spread[2] < spread[3] < spread[4] > spread[5]
-    assert spread[6] < spread[7] < spread[8]
+    assert spread[2] < spread[3] < spread[4] > spread[5] and spread[6] < spread[7] < spread[8]
     assert (places.height[places.expected] == 1.8).all()
 
 
@@ -296,5 +285,4 @@ def test_places_are_carried_from_the_window_before() -> None:
 def test_no_track_is_predicted() -> None:
     nothing = together([earlier_detections([], 4, 1.7, MotionConfig()), detections()])
     places = predicted_places(nothing, 4, 9, 8.0, CONFIG)
-    assert places.ground.shape == (5, 0, 2)
-    assert places.expected.shape == (5, 0)
+    assert places.ground.shape == (5, 0, 2) and places.expected.shape == (5, 0)

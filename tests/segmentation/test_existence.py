@@ -6,11 +6,10 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import room
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Floats, Ints
 from stseg.config import Config
@@ -75,8 +74,7 @@ def test_a_certain_path_of_rejected_candidates_is_a_person() -> None:
         decision = decide(found)
         assert decision.real.all()
         rows = found_by_window(found, decision)
-        assert len(rows) == paths
-        assert all((found.ground[own, 1] == 0).all() and len(own) == 9 for own in rows)
+        assert len(rows) == paths and all((found.ground[own, 1] == 0).all() and len(own) == 9 for own in rows)
 
 
 def test_two_candidates_of_one_body_exclude_each_other() -> None:
@@ -85,8 +83,7 @@ def test_two_candidates_of_one_body_exclude_each_other() -> None:
     found = candidates(*walk(weak), *double)
     decision = decide(found)
     assert np.bincount(found.frame[decision.real]).tolist() == [1] * 9
-    assert (found.ground[decision.real, 1] == 0).all()
-    assert decision.gap == 0
+    assert (found.ground[decision.real, 1] == 0).all() and decision.gap == 0
 
 
 def test_candidates_are_added_inside_paths() -> None:
@@ -117,8 +114,7 @@ def greatest_gain(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> float:
     return best
 
 
-@settings(max_examples=examples(40))
-@given(st.integers(0, 9999))
+@drawn(40, st.integers(0, 9999))
 def test_paths_are_those_of_greatest_gain(seed: int) -> None:
     rng = np.random.default_rng(seed)
     gain = rng.uniform(-4, 2, 6)
@@ -133,8 +129,7 @@ def test_paths_are_those_of_greatest_gain(seed: int) -> None:
     np.testing.assert_allclose(total, greatest_gain(gain, start, end, bonus), atol=1e-9)
 
 
-@settings(max_examples=examples(30))
-@given(st.integers(0, 9999))
+@drawn(30, st.integers(0, 9999))
 def test_marginals_are_those_of_all_labellings(seed: int) -> None:
     rng = np.random.default_rng(seed)
     gain, bonus = rng.uniform(-3, 3, 5), rng.uniform(0, 3, 3)

@@ -91,8 +91,7 @@ def test_patches_are_apart_and_hold_what_is_marked() -> None:
 
 def test_the_way_to_the_next_frame_is_one_patch() -> None:
     here, ahead = np.array([[-4.0, -4.0], [9.0, 9.0]]), np.array([[4.0, 3.0], [9.0, 9.0]])
-    patches = GroundPatches.of(GRID, people_squares(GRID, here, ahead, 0.4))
-    assert len(patches.rectangles) == 1
+    assert len(GroundPatches.of(GRID, people_squares(GRID, here, ahead, 0.4)).rectangles) == 1
     assert GroundPatches.of(GRID, no_squares(GRID)).place.tolist() == [[-1]]
 
 

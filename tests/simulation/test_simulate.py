@@ -11,12 +11,11 @@ import cv2
 import numpy as np
 import pytest
 from cases import cases
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_simulate import extents, hits, shade
 from refusals import refused
 from scipy.spatial.distance import pdist
-from strategies import BARREL, cameras, examples, numbers
+from strategies import BARREL, cameras, drawn, numbers
 
 from stseg.arrays import Floats
 from stseg.commands.simulate import simulate
@@ -90,8 +89,7 @@ def test_half_the_cameras_are_among_the_whole() -> None:
     np.testing.assert_array_equal(whole.views[2].image, half.views[1].image)
 
 
-@settings(max_examples=examples(15))
-@given(camera=cameras(size=(80, 60)), depth=st.floats(0.5, 20.0))
+@drawn(15, camera=cameras(size=(80, 60)), depth=st.floats(0.5, 20.0))
 def test_rays_go_through_the_points_that_their_pixels_show(camera: Camera, depth: float) -> None:
     rays = pixel_rays(camera)
     visible = np.any(rays != 0, axis=-1)
@@ -136,15 +134,13 @@ def test_clothes_belong_to_a_person() -> None:
     assert own_clothing(5, 3).shape[0] == len(PARTS)
 
 
-@settings(max_examples=examples(8))
-@given(
+@drawn(
+    8,
     ground=st.lists(st.tuples(numbers(-1.6, 1.6), numbers(-1.6, 1.6)), min_size=1, max_size=3),
     phase=st.floats(0.0, 6.2),
     distortion=st.sampled_from(((), (-0.22, 0.05, 0.001, -0.001), BARREL)),
 )
-def test_drawing_is_what_every_ray_meets_first(
-    ground: list[tuple[float, float]], phase: float, distortion: tuple[float, ...]
-) -> None:
+def test_rays_meet_what_stands(ground: list[tuple[float, float]], phase: float, distortion: tuple[float, ...]) -> None:
     viewer = viewers(replace(NOISELESS, size=(48, 36), cameras=1, distortion=distortion))[0]
     crowd = crowd_of(np.array(ground), phase)
     bodies = pose(crowd)
@@ -217,8 +213,7 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
     inside, earlier, gone = list[int](), set[int](), set[int]()
     last: dict[int, tuple[Floats, float]] = {}
     for frame, crowd in enumerate(walk_freely(spec)):
-        assert crowd.frame == frame
-        assert pdist(crowd.ground).min(initial=np.inf) > 0.35
+        assert crowd.frame == frame and pdist(crowd.ground).min(initial=np.inf) > 0.35
         truth = crowd.truth(spec.area)
         assert (np.abs(truth["x"]) <= spec.area[0] / 2).all() and (np.abs(truth["y"]) <= spec.area[1] / 2).all()
         inside.append(len(truth))
@@ -233,10 +228,8 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
                 # Two steps are 0.35 to 0.76 of the height.
                 assert way / (0.77 * 1.98) - 1e-9 <= turn / (2 * np.pi) <= 1.2 * (way + 0.05) / (0.34 * 1.45)
             last[person] = ground, phase
-    assert len(inside) == spec.frames
-    assert max(inside) <= spec.people + 1
-    assert 0.8 * spec.people < np.mean(inside)
-    assert len(earlier) > spec.people
+    assert len(inside) == spec.frames and max(inside) <= spec.people + 1
+    assert 0.8 * spec.people < np.mean(inside) and len(earlier) > spec.people
 
 
 def test_regulars_come_back_as_they_were() -> None:
@@ -246,8 +239,7 @@ def test_regulars_come_back_as_they_were() -> None:
         heights.update(zip(crowd.id.tolist(), crowd.height.tolist(), strict=True))
         came.update(set(crowd.id.tolist()) - before)
         before = set(crowd.id.tolist())
-    assert set(came) == set(range(1, spec.people + 1))
-    assert min(came.values()) >= 3
+    assert set(came) == set(range(1, spec.people + 1)) and min(came.values()) >= 3
     assert len(heights) == spec.people
 
 
@@ -294,8 +286,7 @@ def images(**settings: object) -> Floats:
 
 def test_noise_and_light_are_as_large_as_asked_for() -> None:
     noise = images(noise=6.0)[0] - images()[0]
-    assert np.std(noise) == pytest.approx(6.0, rel=0.05)
-    assert abs(np.mean(noise)) < 0.3
+    assert np.std(noise) == pytest.approx(6.0, rel=0.05) and abs(np.mean(noise)) < 0.3
     means = images(light_drift=0.2, light_period=1.0).mean((2, 3, 4))
     swing = (means.max(axis=0) - means.min(axis=0)) / means.mean(axis=0) / 2
     np.testing.assert_allclose(swing, 0.2, atol=0.02)
@@ -352,8 +343,7 @@ def _detections(share: float, rounds: int) -> tuple[int, list[Floats]]:
 def test_detector_misses_the_hidden_and_shakes() -> None:
     full, boxes = _detections(1.0, 300)
     half, little = (_detections(share, 300)[0] for share in (0.4, 0.1))
-    assert full > 0.93 * 300 > half > 0.3 * 300 > little
-    assert little < 0.1 * 300
+    assert full > 0.93 * 300 > half > 0.3 * 300 > little and little < 0.1 * 300
     np.testing.assert_allclose(np.mean(boxes, axis=0), [99.5, 79.5, 40, 100], atol=0.8)
     assert 1.0 < np.std(boxes, axis=0)[3] < 8.0
 
@@ -382,8 +372,7 @@ def test_a_written_scene_reads_back(tmp_path: Path) -> None:
     for moment, *read in zip(moments, *readers, strict=True):
         for k, view in enumerate(moment.views):
             image, mask, boxes, instances = (one.views[k] for one in read)
-            assert isinstance(image, np.ndarray)
-            assert np.abs(image.astype(int) - view.image).mean() < 4
+            assert isinstance(image, np.ndarray) and np.abs(image.astype(int) - view.image).mean() < 4
             np.testing.assert_array_equal(mask, np.where(view.instances > 0, 255, 0))
             np.testing.assert_array_equal(instances, view.instances)
             np.testing.assert_allclose(boxes.pixel, view.boxes.pixel, atol=0.051)
@@ -408,9 +397,7 @@ def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "link").unlink()
     refused(OutputError, "no UTF-8", write_scene, tmp_path / os.fsdecode(b"\xff"), film)
     (tmp_path / "stseg-scene").unlink()
-    refused(
-        OutputError, r"truth\.csv: found a file that stseg did not make", write_scene, tmp_path, film, overwrite=True
-    )
+    refused(OutputError, r"truth\.csv: found a file that stseg did not", write_scene, tmp_path, film, overwrite=True)
     with pytest.raises(OutputError):
         write_scene(tmp_path / "notes.txt" / "below", film)
 

@@ -48,9 +48,7 @@ def crossing(frame: int) -> list[tuple[float, float]]:
 def run(tracker: str, first: int, stop: int, rest: bool = True) -> list[Commit]:
     """Commits of a tracker for frames first .. stop - 1 of two people who pass each other."""
     follow = find_tracker(tracker)(RIG, CONFIG, first)
-    done = [
-        commit for frame in range(first, stop) for commit in follow.add(scene(follow, frame, *crossing(frame)), UNSEEN)
-    ]
+    done = [new for frame in range(first, stop) for new in follow.add(scene(follow, frame, *crossing(frame)), UNSEEN)]
     return done + follow.finish() if rest else done
 
 
@@ -62,12 +60,10 @@ def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) ->
     committed = [s.frame for commit in commits for s in commit.frames]
     assert committed == list(range(first, first + frames))
     for commit in commits:
-        assert commit.label.shape == (len(commit.frames), *RIG.grid.shape)
-        assert commit.label.dtype == np.int32
+        assert commit.label.shape == (len(commit.frames), *RIG.grid.shape) and commit.label.dtype == np.int32
         assert set(commit.trajectory["frame"]) <= {s.frame for s in commit.frames}
     rows = rows_of(commits)
-    assert len(rows) == 2 * frames
-    assert len(np.unique(rows["id"])) == 2
+    assert len(rows) == 2 * frames and len(np.unique(rows["id"])) == 2
     keys = [(row["frame"], row["id"]) for row in rows]
     assert keys == sorted(set(keys))
 
@@ -81,8 +77,7 @@ def test_windows_are_those_of_the_run(first: int, frames: int) -> None:
     ranges = [(w.index, w.solve_first, w.solve_stop, w.commit_first, w.commit_stop) for w in expected]
     committed = rows[["index", "solve_first", "solve_stop", "commit_first", "commit_stop"]].tolist()
     assert committed == ranges
-    assert (rows["energy"] < 0).all()
-    assert (rows["energy_quantum"] == QUANTUM).all()
+    assert (rows["energy"] < 0).all() and (rows["energy_quantum"] == QUANTUM).all()
 
 
 def test_no_frames_no_commits() -> None:
@@ -156,8 +151,7 @@ def test_frames_without_people(tracker: str) -> None:
     commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame), UNSEEN)]
     commits += follow.finish()
     assert sum(len(commit.frames) for commit in commits) == 20
-    assert not any(commit.label.any() for commit in commits)
-    assert len(rows_of(commits)) == 0
+    assert not any(commit.label.any() for commit in commits) and len(rows_of(commits)) == 0
     assert len(follow.predict(20) or ()) == 0
 
 
@@ -171,8 +165,7 @@ def test_the_cut_does_not_make_people_of_passing_noise() -> None:
             noisy.log_odds[1, 12, 12] = 4.0
         commits += follow.add(noisy, UNSEEN)
     rows = rows_of(commits + follow.finish())
-    assert np.unique(rows["id"]).tolist() == [1]
-    assert len(rows) == 10
+    assert np.unique(rows["id"]).tolist() == [1] and len(rows) == 10
 
 
 @pytest.mark.parametrize("tracker", COLOURLESS)
@@ -183,8 +176,7 @@ def test_whom_a_tracker_expects(tracker: str) -> None:
     for frame in range(LENGTH + 2):
         follow.add(scene(follow, frame, (-1.5 + 0.1 * frame, 0.2)), UNSEEN)
         expected = follow.predict(frame + 1)
-        assert expected is not None
-        assert len(expected) == 1
+        assert expected is not None and len(expected) == 1
         if frame > LENGTH:  # by then the velocity is known
             np.testing.assert_allclose(expected.ground, [[-1.5 + 0.1 * (frame + 1), 0.2]], atol=0.02)
 
@@ -228,8 +220,7 @@ def test_rows_are_sorted_by_id() -> None:
     ids, height = np.array([9, 4]), np.array([1.7, 1.8])
     tracks = TrackPlaces(ids, ground, covariance, height, height / 4, height * 3)
     rows = trajectory_rows(7, tracks, height / 2, np.array([2, 3]))
-    assert rows["id"].tolist() == [4, 9]
-    assert rows["frame"].tolist() == [7, 7]
+    assert rows["id"].tolist() == [4, 9] and rows["frame"].tolist() == [7, 7]
     assert rows[["x", "y", "z", "xx", "xy", "yy", "views"]].tolist()[0] == (3.0, 4.0, 0.0, 0.1, 0.02, 0.3, 3)
     np.testing.assert_allclose(rows["height"], [1.8, 1.7], rtol=1e-6)
     np.testing.assert_allclose(rows["width"], [0.45, 0.425], rtol=1e-6)

@@ -6,12 +6,11 @@ from itertools import combinations, islice, pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import compiled_only, in_ci
 from refusals import refused
 from scenes import boxes, found, people, room
-from strategies import examples
+from strategies import drawn
 
 from stseg import Tracker
 from stseg.arrays import Floats, Observation, Rows
@@ -56,9 +55,6 @@ def apart(spec: SceneSpec, one: int, other: int) -> dict[int, float]:
 @pytest.mark.parametrize("stops", [(), ((0.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0))])
 def test_a_route_is_a_way_through_time(stops: tuple[tuple[float, float, float], ...]) -> None:
     refused(ConfigError, r"stops: .*rising times", Route, 1.7, stops)
-
-
-def test_every_person_of_a_told_scene_has_a_route() -> None:
     refused(ConfigError, "routes: found 1, expected none, or 2", replace, standing(), people=2)
 
 
@@ -97,8 +93,7 @@ def test_people_cross_at_less_than_half_a_metre() -> None:
 @pytest.mark.parametrize("name", ["meeting", "meeting_heights"])
 def test_two_stand_together_for_ten_seconds_and_part(name: str) -> None:
     distance = np.array(list(apart(NAMED[name], 1, 2).values()))
-    assert distance[33:134] == pytest.approx(0.5, abs=1e-6)
-    assert distance[-1] > 3
+    assert distance[33:134] == pytest.approx(0.5, abs=1e-6) and distance[-1] > 3
     heights = [route.height for route in NAMED[name].routes]
     assert abs(heights[1] - heights[0]) == pytest.approx(0.08 if name == "meeting_heights" else 0.0)
 
@@ -115,8 +110,7 @@ def test_things_happen_where_windows_end() -> None:
     assert min(abs(meeting[-1] - end) for end in ends) <= 2
     inside: list[set[int]] = [set(crowd.truth(spec.area)["id"].tolist()) for crowd in walk_routes(spec)]
     changes = [frame for frame in range(1, spec.frames) if inside[frame] != inside[frame - 1]]
-    assert len(changes) >= 4
-    assert all({frame - 1, frame} & shared for frame in changes)
+    assert len(changes) >= 4 and all({frame - 1, frame} & shared for frame in changes)
 
 
 @cache
@@ -128,9 +122,7 @@ def switches(name: str, kind: str, stop: int) -> int:
     """How often somebody is taken for somebody else in the first frames of a scene."""
     rig, film = SceneFilm(NAMED[name]).rig, filmed(name, stop)
     pipeline = Pipeline(rig, [kind] * len(rig.cameras), Config(), "cut")
-    frames = [
-        FrameSet(one.frame, tuple(view.boxes if kind == "boxes" else view.mask for view in one.views)) for one in film
-    ]
+    frames = [FrameSet(one.frame, tuple(v.boxes if kind == "boxes" else v.mask for v in one.views)) for one in film]
     foreground = [ViewForeground() for _ in rig.cameras]
     commits = [step.commit for step in run_session(pipeline, foreground, frames, 0, lambda _: None)]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
@@ -141,16 +133,12 @@ def switches(name: str, kind: str, stop: int) -> int:
 
 
 @compiled_only
-@pytest.mark.parametrize("name", in_ci(*SCENES))
-def test_nobody_is_taken_for_somebody_else_from_boxes(name: str) -> None:
-    assert switches(name, "boxes", NAMED[name].frames) == 0
-
-
-@compiled_only
-@pytest.mark.parametrize("name", ["crossing", *in_ci("border")])
-def test_nobody_is_taken_for_somebody_else_from_silhouettes(name: str) -> None:
-    """The first six seconds, in which people cross."""
-    assert switches(name, "pixels", 60) == 0
+@pytest.mark.parametrize(
+    ("name", "kind"), [("crossing", "pixels"), *in_ci(("border", "pixels"), *((name, "boxes") for name in SCENES))]
+)
+def test_nobody_is_taken_for_somebody_else(name: str, kind: str) -> None:
+    """From boxes, and from silhouettes of the first six seconds, in which people cross."""
+    assert switches(name, kind, 60 if kind == "pixels" else NAMED[name].frames) == 0
 
 
 LENGTH, RATE = 30, 5.0
@@ -160,8 +148,7 @@ def frame_of(pairs: set[tuple[int, int]]) -> Blobs:
     """Four blobs, of which these touch."""
     names = np.zeros(4, np.int64)
     touching = np.array(sorted(pairs), np.int64).reshape(-1, 2)
-    cells = np.zeros((1, 1), np.int32)
-    return Blobs(cells, names, names, np.zeros((4, 2)), np.zeros(4), touching)
+    return Blobs(np.zeros((1, 1), np.int32), names, names, np.zeros((4, 2)), np.zeros(4), touching)
 
 
 def told(touching: list[set[tuple[int, int]]], names: list[int], cuts: list[int]) -> Rows:
@@ -181,9 +168,7 @@ def plain(touching: list[set[tuple[int, int]]], names: list[int], parting: int) 
     """The definition, frame by frame."""
     found = []
     for a, b in {tuple(sorted((names[i], names[j]))) for pairs in touching for i, j in pairs}:
-        frames = [
-            f for f, pairs in enumerate(touching) if (a, b) in {tuple(sorted((names[i], names[j]))) for i, j in pairs}
-        ]
+        frames = [f for f, met in enumerate(touching) if {a, b} in [{names[i], names[j]} for i, j in met]]
         for k, frame in enumerate(frames):
             if a > 0 and (k == 0 or frame - frames[k - 1] - 1 > parting):
                 found.append((frame, b"merge", a, b))
@@ -195,9 +180,7 @@ def plain(touching: list[set[tuple[int, int]]], names: list[int], parting: int) 
 PAIRS = st.sets(st.sampled_from([(0, 1), (0, 2), (1, 3), (2, 3)]), max_size=3)
 
 
-@settings(max_examples=examples(80))
-@given(
-    st.lists(PAIRS, min_size=LENGTH, max_size=LENGTH), st.permutations([0, 1, 2, 7]),
+@drawn(80, st.lists(PAIRS, min_size=LENGTH, max_size=LENGTH), st.permutations([0, 1, 2, 7]),
     st.lists(st.integers(1, LENGTH - 1), max_size=5), st.integers(0, 6),
 )  # fmt: skip
 def test_encounters_do_not_depend_on_the_windows(
@@ -230,11 +213,6 @@ FIRST, PLACES = 7, [(0.1, 0.0), (-0.2, 0.5), (1.02, 0.2), (-0.4, -1.01)]
 TRIANGLE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)])
 
 
-def rig_of_area(polygon: Floats | None = None, closed: bool = False) -> Rig:
-    grid = Grid(x=(-1.0, 1.0), y=(-1.0, 1.0), planes=2, polygon=polygon)
-    return replace(room(), grid=grid, closed=closed)
-
-
 def commit_of(rig: Rig) -> Commit:
     """Two frames in each of which tracks 1, 2, ... are at PLACES, and have a cell each."""
     rows = np.zeros(2 * len(PLACES), TRAJECTORY)
@@ -259,13 +237,12 @@ def commit_of(rig: Rig) -> Commit:
     ids=["rectangle", "polygon", "closed"],
 )
 def test_rows_and_labels_are_of_people_inside(polygon: Floats | None, closed: bool, inside: list[list[int]]) -> None:
-    rig = rig_of_area(polygon, closed)
+    rig = replace(room(), grid=Grid(x=(-1.0, 1.0), y=(-1.0, 1.0), planes=2, polygon=polygon), closed=closed)
     whole = commit_of(rig)
     kept = within_area(whole, rig)
     for k, ids in enumerate(inside):
         rows = kept.trajectory[kept.trajectory["frame"] == FIRST + k]
-        assert rows["id"].tolist() == ids
-        assert np.setdiff1d(kept.label[k], [0]).tolist() == ids
+        assert rows["id"].tolist() == ids and np.setdiff1d(kept.label[k], [0]).tolist() == ids
     assert np.setdiff1d(whole.label, [0]).tolist() == [1, 2, 3, 4]  # what a tracker holds is not changed
 
 

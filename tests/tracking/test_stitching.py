@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_files import trajectory_of
-from strategies import examples
+from strategies import drawn
 
 from stseg.arrays import Rows
 from stseg.config import Config, SegmentConfig, TrackingConfig
@@ -32,17 +31,14 @@ def stitched(*segments: tuple[Rows, Rows]) -> StitchedTracks:
     return stitcher.joined()
 
 
-@settings(max_examples=examples(60))
-@given(
-    st.floats(1.0, 30.0), st.integers(0, 500), st.integers(1, 3000), st.floats(1.0, 60.0), st.integers(0, 10)
+@drawn(60, st.floats(1.0, 30.0), st.integers(0, 500), st.integers(1, 3000), st.floats(1.0, 60.0), st.integers(0, 10)
 )  # fmt: skip
 def test_segments_partition_the_run(rate: float, first: int, length: int, seconds: float, warm_up: int) -> None:
     config = Config(segments=SegmentConfig(length=seconds, warm_up=warm_up))
     parts = segments(rate, config, first, first + length)
     assert [part.index for part in parts] == list(range(len(parts)))
     assert [part.first for part in parts] == [first, *(part.stop for part in parts[:-1])]
-    assert parts[-1].stop == first + length
-    assert parts[0].lead == first
+    assert parts[-1].stop == first + length and parts[0].lead == first
     for part in parts:
         assert first <= part.lead <= part.first < part.stop
         assert part.first - part.lead >= min(part.first - first, warm_up * rate) or part.index == 0
@@ -57,8 +53,7 @@ def test_less_than_two_segments_become_two_of_equal_work() -> None:
             assert abs((parts[0].stop - parts[0].lead) - (parts[1].stop - parts[1].lead)) <= 2 * 10
 
 
-@settings(max_examples=examples(40))
-@given(st.floats(1.0, 30.0), st.integers(0, 200), st.integers(100, 1500))
+@drawn(40, st.floats(1.0, 30.0), st.integers(0, 200), st.integers(100, 1500))
 def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> None:
     config = Config(segments=SegmentConfig(length=10.0, warm_up=2.0))
     for part in segments(rate, config, first, first + length):
@@ -91,30 +86,23 @@ def test_a_track_keeps_its_name_over_a_seam() -> None:
     ],
     ids=["unclaimed", "told"],
 )
-def test_unclaimed_tracks_end_and_begin_at_the_seam(
-    first: tuple[Rows, Rows], later: tuple[Rows, Rows], told: tuple[int, int]
-) -> None:
+def test_seams_of_unclaimed_tracks(first: tuple[Rows, Rows], later: tuple[Rows, Rows], told: tuple[int, int]) -> None:
     joined = stitched(first, later)
     assert np.unique(joined.committed["id"]).tolist() == [1, 2]
     assert [(e["frame"], e["kind"], e["id"]) for e in joined.events] == [(told[0], b"death", 1), (told[1], b"birth", 2)]
 
 
-def test_a_track_of_the_warm_up_alone_leaves_nothing() -> None:
+def test_tracks_of_a_warm_up_and_the_one_shared_longest() -> None:
     later = np.concatenate([standing(1, range(15, 40), 0.0), standing(2, range(15, 19), 5.0)])
     joined = stitched((standing(1, range(20), 0.0), events()), (later, events()))
-    assert np.unique(joined.committed["id"]).tolist() == [1]
-    assert len(joined.events) == 0
-
-
-def test_the_track_that_is_shared_longest_wins() -> None:
-    """One to one: two tracks of the warm-up lie near one earlier track."""
+    assert np.unique(joined.committed["id"]).tolist() == [1] and len(joined.events) == 0
     both = np.concatenate([standing(1, range(17, 40), 0.2), standing(2, range(10, 40), -0.2)])
     joined = stitched((standing(1, range(20), 0.0), events()), (both, events()))
     assert joined.committed["id"][joined.local == 2].tolist()[-1] == 1
 
 
-@settings(max_examples=examples(40))
-@given(
+@drawn(
+    40,
     st.lists(st.integers(0, 6), min_size=12, max_size=12),
     st.lists(st.tuples(st.integers(0, 3), st.integers(1, 6)), unique=True, max_size=12),
     st.integers(0, 9),

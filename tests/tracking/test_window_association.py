@@ -5,12 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_files import trajectory_of
 from scenes import corner_cameras
 from scipy.optimize import linear_sum_assignment
-from strategies import examples, numbers
+from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Rows
 from stseg.bodies.pillars import BodyTable
@@ -39,14 +38,12 @@ Path = dict[int, tuple[float, float]]
 RUNS = st.tuples(st.integers(0, 200), st.integers(1, 150)).map(lambda run: (run[0], run[0] + run[1]))
 
 
-@settings(max_examples=examples(300))
-@given(RUNS, numbers(0.5, 60), numbers(0.1, 4))
+@drawn(300, RUNS, numbers(0.5, 60), numbers(0.1, 4))
 def test_windows_partition_any_run(run: tuple[int, int], rate: float, seconds: float) -> None:
     first, stop = run
     config = TrackingConfig(window=seconds)
     length, shared = window_length(rate, config)
-    assert SHORTEST <= length <= LONGEST
-    assert 1 <= shared < length
+    assert SHORTEST <= length <= LONGEST and 1 <= shared < length
     parts = list(windows(rate, config, first, stop))
     assert [f for w in parts for f in range(w.commit_first, w.commit_stop)] == list(range(first, stop))
     for w in parts:
@@ -60,15 +57,13 @@ def test_windows_partition_any_run(run: tuple[int, int], rate: float, seconds: f
         assert after.solve_first < before.solve_stop  # they share frames
 
 
-@settings(max_examples=examples(100))
-@given(RUNS, RUNS, numbers(0.5, 60))
+@drawn(100, RUNS, RUNS, numbers(0.5, 60))
 def test_a_part_is_cut_where_the_whole_is(run: tuple[int, int], other: tuple[int, int], rate: float) -> None:
     first, stop = run
     whole = {w.index: w for w in windows(rate, CONFIG, 0, 400)}
     for w in windows(rate, CONFIG, first, stop):
         same = whole[w.index]
-        assert w.commit_first in (first, same.commit_first)
-        assert w.commit_stop in (stop, same.commit_stop)
+        assert w.commit_first in (first, same.commit_first) and w.commit_stop in (stop, same.commit_stop)
         if first <= same.solve_first and same.solve_stop < stop:
             assert w == same
     ended = list(windows(rate, CONFIG, first, other[1] + first))
@@ -77,7 +72,7 @@ def test_a_part_is_cut_where_the_whole_is(run: tuple[int, int], other: tuple[int
         assert w == open_ended
 
 
-@given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 999))
+@drawn(100, st.integers(0, 4), st.integers(0, 4), st.integers(0, 999))
 def test_assignment_of_least_cost(rows: int, columns: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     cost = rng.uniform(0, 2, (rows, columns))
@@ -209,8 +204,7 @@ def test_identities_last_over_windows() -> None:
     paths = [walk((-3, -1), (0.5, 0), frames), walk((3, 1), (-0.5, 0), frames)]
     windows_made, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 32)
     assert len(windows_made) == 7
-    assert len(names) == 64
-    assert sorted([ids_of(names, 0), ids_of(names, 1)]) == [[1], [2]]
+    assert len(names) == 64 and sorted([ids_of(names, 0), ids_of(names, 1)]) == [[1], [2]]
     assert events_of(decisions, "birth") == [(0, 1, 0), (0, 2, 0)]
     assert all(kind == "birth" for d in decisions for _, kind, *_ in d.events)
     assert all(reason for d in decisions for *_, reason in d.events)
@@ -228,8 +222,7 @@ def test_identities_follow_the_cells_whatever_the_chains_say() -> None:
         blobs, tracklets = tracklets_of(paths, part, chain=[10 * index + 100, 10 * index + 101])
         decision = identities.decide(window, blobs, tracklets)
         found.append([int(decision.identity[3][blobs[3].person.tolist().index(k)]) for k in range(2)])
-    assert all(pair == found[0] for pair in found)
-    assert sorted(found[0]) == [1, 2]
+    assert all(pair == found[0] for pair in found) and sorted(found[0]) == [1, 2]
 
 
 def test_birth_and_death() -> None:
@@ -238,8 +231,7 @@ def test_birth_and_death() -> None:
     comes = walk((0, 3), (0.2, 0), range(17, 40))
     _, decisions, names = decide(TrackAssociation(RATE, CONFIG), [stays, leaves, comes], 40)
     ids = [ids_of(names, k) for k in range(3)]
-    assert [len(i) for i in ids] == [1, 1, 1]
-    assert len({i[0] for i in ids}) == 3
+    assert [len(i) for i in ids] == [1, 1, 1] and len({i[0] for i in ids}) == 3
     assert [(f, i) for f, i, _ in events_of(decisions, "birth")][2:] == [(17, ids[2][0])]
     assert events_of(decisions, "death") == [(10, ids[1][0], 0)]
 
@@ -250,8 +242,7 @@ def test_somebody_unseen_for_a_moment_is_found_again() -> None:
     _, decisions, names = decide(TrackAssociation(RATE, CONFIG), [seen], 40)
     assert set(names.values()) == {1}
     assert events_of(decisions, "hand-over") == [(19, 1, 0)]
-    assert len(events_of(decisions, "birth")) == 1
-    assert not events_of(decisions, "death")
+    assert len(events_of(decisions, "birth")) == 1 and not events_of(decisions, "death")
 
 
 def test_merge_and_split() -> None:
@@ -267,8 +258,7 @@ def test_merge_and_split() -> None:
     assert told == [f for f in frames if len(blobs_in(paths, f).touches)]
 
 
-@settings(max_examples=8)
-@given(st.integers(0, 999))
+@drawn(24, st.integers(0, 999))
 def test_events_are_of_committed_frames_in_order(seed: int) -> None:
     rng = np.random.default_rng(seed)
     walks = (walk(rng.uniform(-1.5, 1.5, 2).tolist(), rng.uniform(-0.5, 0.5, 2).tolist(), range(40)) for _ in range(4))
@@ -288,8 +278,7 @@ def test_events_are_of_committed_frames_in_order(seed: int) -> None:
         for k, place in there:  # whoever stands more than a cell from all others has cells, so a name
             assert (k, frame) in names or any(0 < np.hypot(*np.subtract(place, other)) < 0.3 for _, other in there)
     born = [i for _, i, _ in events_of(decisions, "birth")]
-    assert len(set(born)) == len(born)
-    assert set(names.values()) == set(born)
+    assert len(set(born)) == len(born) and set(names.values()) == set(born)
 
 
 def rows_of(paths: dict[int, Path]) -> Rows:
@@ -303,15 +292,14 @@ def test_short_tracks_go_with_an_event() -> None:
     least = round(CONFIG.minimum_duration * RATE)
     rows = rows_of({1: walk((0, 0), (0, 0), range(5, 5 + least)), 2: walk((2, 0), (0, 0), range(7, 6 + least))})
     kept, events = drop_short(rows, RATE, CONFIG)
-    assert np.unique(kept["id"]).tolist() == [1]
-    assert len(kept) == least
+    assert np.unique(kept["id"]).tolist() == [1] and len(kept) == least
     assert [(e["frame"], e["kind"], e["id"], e["other"]) for e in events] == [(7, b"dropped", 2, 0)]
     assert events["reason"][0]
     empty, none = drop_short(rows[:0], RATE, CONFIG)
     assert len(empty) == len(none) == 0
 
 
-@given(st.sets(st.integers(0, 30), min_size=2), st.sets(st.integers(0, 30), min_size=1))
+@drawn(100, st.sets(st.integers(0, 30), min_size=2), st.sets(st.integers(0, 30), min_size=1))
 def test_short_gaps_are_filled_on_straight_lines(first: set[int], second: set[int]) -> None:
     whole = {4: walk((0, 1), (0.5, -0.3), range(31)), 2: walk((3, 3), (0, 0), range(31))}
     seen = rows_of({i: {f: whole[i][f] for f in frames} for i, frames in ((4, first), (2, second))})
@@ -326,8 +314,7 @@ def test_short_gaps_are_filled_on_straight_lines(first: set[int], second: set[in
                 np.column_stack([own[x], own[y]]), [whole[i][f] for f in own["frame"]], atol=1e-9
             )
         unseen = ~np.isin(own["frame"], list(frames))
-        assert (own["xx"][unseen] > 0.01).all()
-        assert (own["xx"][~unseen] == 0.01).all()
+        assert (own["xx"][unseen] > 0.01).all() and (own["xx"][~unseen] == 0.01).all()
         assert (np.isnan(own["height"]) == unseen).all() and np.isnan(own["width"][unseen]).all()
     keys = [(row["frame"], row["id"]) for row in filled]
     assert keys == sorted(keys)
@@ -343,8 +330,7 @@ def test_boxes_of_tracks_lie_in_the_images() -> None:
     rows = rows_of({3: walk((-1.5, -1), (0.5, 0.2), range(6)), 5: {2: (0.0, 0.0)}})
     boxes = box_rows(tables, rows)
     keys = [(b["frame"], b["id"], b["view"]) for b in boxes]
-    assert keys == sorted(keys)
-    assert len(set(keys)) == len(keys) == 4 * len(rows)
+    assert keys == sorted(keys) and len(set(keys)) == len(keys) == 4 * len(rows)
     for box in boxes:
         assert 0 <= box["left"] < box["left"] + box["width"] <= cameras[box["view"]].size[0]
         assert 0 <= box["top"] < box["top"] + box["height"] <= cameras[box["view"]].size[1]

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 from simulated_people import BORDER, CONFIG, RATE, committed, gone, rows_of, runs, straight, swapped, visit
-from strategies import examples, numbers
+from strategies import drawn, numbers
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig
@@ -71,9 +70,7 @@ def test_events_of_a_swap_are_under_the_names_that_are_right() -> None:
     assert sorted(identity for _, _, identity, _ in passed) == [1, 2]
     assert all(72 <= frame < 89 and other == 0 for frame, _, _, other in passed)
     reasons = {e["id"]: e["reason"] for e in found.events if e["kind"] == b"hand-over"}
-    assert all(
-        reason.startswith(b"goes on as %d of /committed" % (3 - identity)) for identity, reason in reasons.items()
-    )
+    assert all(said.startswith(b"goes on as %d of /committed" % (3 - name)) for name, said in reasons.items())
     assert [one for one in story(found.events) if one[1] != b"hand-over"] == [
         (0, b"birth", 1, 0),
         (0, b"birth", 2, 0),
@@ -104,8 +101,7 @@ def test_rows_of_dropped_tracks_have_no_identity() -> None:
     rows = committed(rows_of({5: (visit(1), 1.7, range(40)), 7: (straight(1.0, -2.0, 0, 0), 1.7, range(10, 13))}))
     found = whole(rows, events_of())
     assert found.identity.tolist() == np.where(rows["id"] == 5, 5, 0).tolist()
-    assert story(found.events) == [(10, b"dropped", 7, 0)]
-    assert set(found.trajectory["id"].tolist()) == {5}
+    assert story(found.events) == [(10, b"dropped", 7, 0)] and set(found.trajectory["id"].tolist()) == {5}
 
 
 def test_raw_places_stay_beside_the_smoothed() -> None:
@@ -113,12 +109,10 @@ def test_raw_places_stay_beside_the_smoothed() -> None:
     found = whole(rows, events_of()).trajectory
     np.testing.assert_array_equal(found["raw_x"], rows["x"])
     np.testing.assert_array_equal(found["raw_y"], rows["y"])
-    assert (found["x"] != rows["x"]).all()
-    assert (found["xx"] < rows["xx"]).all()
+    assert (found["x"] != rows["x"]).all() and (found["xx"] < rows["xx"]).all()
 
 
-@settings(max_examples=examples(60))
-@given(runs(5))
+@drawn(60, runs(5))
 def test_tracks_and_events_of_any_run_do_not_contradict(drawn: Rows) -> None:
     rows = committed(drawn)
     found = whole(rows, lives(rows))
@@ -177,15 +171,14 @@ def measured(draw: st.DrawFn) -> tuple[Ints, Floats, Floats]:
     return frames, ground, root @ root.transpose(0, 2, 1) + 1e-3 * np.eye(2)
 
 
-@given(measured())
+@drawn(100, measured())
 def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = path
     places, spread = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, [np.arange(len(frames))], MOTION)
     expected, covariance = conditioned(frames / SMOOTHER_RATE, ground, noise)
     np.testing.assert_allclose(places, expected, atol=1e-9, rtol=0)
     np.testing.assert_allclose(spread, covariance, atol=1e-9, rtol=0)
-    assert (np.linalg.eigvalsh(spread) > 0).all()
-    assert (np.linalg.eigvalsh(noise - spread) > -1e-9).all()
+    assert (np.linalg.eigvalsh(spread) > 0).all() and (np.linalg.eigvalsh(noise - spread) > -1e-9).all()
 
 
 def test_a_single_measurement_stays_what_it_is() -> None:
@@ -233,10 +226,8 @@ def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
         assert (smoothed["xx"][own] < 0.1**2).all()
 
 
-@given(measured(), measured())
-def test_paths_smoothed_at_once_are_as_each_alone(
-    one: tuple[Ints, Floats, Floats], other: tuple[Ints, Floats, Floats]
-) -> None:
+@drawn(100, measured(), measured())
+def test_paths_at_once_are_as_alone(one: tuple[Ints, Floats, Floats], other: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = (np.concatenate(pair) for pair in zip(one, other, strict=True))
     tracks = np.split(np.arange(len(frames)), [len(one[0])])
     both = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, tracks, MOTION)

@@ -30,14 +30,12 @@ CELL = 0.1
 
 def residuals(rig: Rig, kind: str, standing: Floats) -> Floats:
     """Residual of each view of a rig, of people as the room's own cameras show them."""
-    views = evidence_of(kind, room().cameras, standing)
-    return detector_of(rig, kind).explain(views, None).residual
+    return detector_of(rig, kind).explain(evidence_of(kind, room().cameras, standing), None).residual
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_views_of_a_sound_rig_are_not_aside(kind: str) -> None:
-    standing = people((-0.4, 0.1))
-    assert np.abs(residuals(room(), kind, standing)).max() < 0.03
+    assert np.abs(residuals(room(), kind, people((-0.4, 0.1)))).max() < 0.03
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
@@ -73,8 +71,7 @@ def test_views_are_named_beyond_a_cell_alone() -> None:
     aside[:, 1] += 0.14
     assert [one.view for one in views_off(aside, CELL)] == [2, 1]
     aside[3:, 1:3] = np.nan
-    assert views_off(aside, CELL) == []
-    assert views_off(np.full((40, 3), np.nan), CELL) == []
+    assert views_off(aside, CELL) == [] and views_off(np.full((40, 3), np.nan), CELL) == []
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -84,8 +81,7 @@ def test_a_knock_is_found_with_its_window(side: int) -> None:
     aside[35:, 3] += side * 0.15
     knock = find_residual_step(aside, CELL)
     assert knock is not None and knock.view == 3
-    assert abs(knock.frame - 35) <= 1
-    assert knock.after - knock.before == pytest.approx(side * 0.15, abs=0.04)
+    assert abs(knock.frame - 35) <= 1 and knock.after - knock.before == pytest.approx(side * 0.15, abs=0.04)
 
 
 @pytest.mark.slow
@@ -157,8 +153,7 @@ def test_two_cameras_are_told_apart_by_time() -> None:
 def test_a_step_that_harms_nobody_is_none() -> None:
     agreement = 0.01 * correlated(400, 3, 5)
     agreement[200:, 1] -= 0.2
-    assert len(find_knocks(agreement)) == 1
-    assert find_knocks(agreement, least=0.5) == []
+    assert len(find_knocks(agreement)) == 1 and find_knocks(agreement, least=0.5) == []
 
 
 def rooms() -> list[Bytes]:
@@ -190,8 +185,7 @@ def test_a_simulated_knock_is_reported_with_its_frame() -> None:
         ]
     ).T
     (knock,) = find_knocks(shifts, least=0.5)
-    assert (knock.view, knock.frame) == (1, 47)
-    assert knock.after == pytest.approx(-2.0, abs=0.4)
+    assert (knock.view, knock.frame) == (1, 47) and knock.after == pytest.approx(-2.0, abs=0.4)
 
 
 HEIGHT = 1.7
