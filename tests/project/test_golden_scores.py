@@ -22,8 +22,8 @@ SLACK = {"MODA": 1.0, "IDF1": 1.0}
 """How far scores may fall below the golden ones, percent."""
 RECORDINGS: dict[str, dict[str, Any]] = {
     "demo": {"scene": "demo"},
-    "easy": {"scene": "easy", "seconds": 10.0},
-    "similar": {"scene": "similar", "seconds": 12.0},
+    "easy": {"scene": "easy", "seconds": 10.0, "kinds": ("video",)},
+    "similar": {"scene": "similar", "seconds": 12.0, "kinds": ("video",)},
     "dense boxes": {"scene": "dense", "seconds": 6.0, "kinds": ("boxes",)},
 }
 """What is filmed: arguments of `stseg.simulate`."""
