@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Floats, Rows
 from stseg.errors import printable
 from stseg.io.extras import load_extra
 from stseg.io.outputs.whole_files import MARK
@@ -121,7 +121,8 @@ def _path_lengths(trajectory: Rows) -> dict[int, float]:
     """Length of each track's path, metres."""
     rows = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     ids, place = np.unique(rows["id"], return_inverse=True)
-    steps = np.hypot(np.diff(rows["x"]), np.diff(rows["y"])) * (np.diff(rows["id"]) == 0)
+    offset: list[Floats] = [np.diff(rows[axis]) for axis in ("x", "y")]
+    steps = np.hypot(*offset) * (np.diff(rows["id"]) == 0)
     return dict(zip(ids.tolist(), np.bincount(place[1:], steps, len(ids)).tolist(), strict=True))
 
 

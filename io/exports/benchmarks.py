@@ -9,7 +9,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
-from stseg.arrays import Ints, Rows
+from stseg.arrays import Ints, Rows, Singles
 from stseg.geometry import Grid
 from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile.reading.run_reader import Run
@@ -90,9 +90,9 @@ def wildtrack_positions(trajectory: Rows, grid: Grid) -> Ints:
 def _boxes_of_rows(run: Run) -> Mapping[tuple[int, int, int], Mapping[str, int]]:
     """Edges of boxes in whole pixels, by frame, id and view."""
     boxes = run.boxes
-    left, top = np.rint(boxes["left"]), np.rint(boxes["top"])
-    right, bottom = np.rint(boxes["left"] + boxes["width"]), np.rint(boxes["top"] + boxes["height"])
-    edges = np.stack([left, top, right, bottom], -1).astype(int).tolist()
+    corner: Singles = np.stack([boxes["left"], boxes["top"]], -1)
+    size: Singles = np.stack([boxes["width"], boxes["height"]], -1)
+    edges = np.rint(np.hstack([corner, corner + size])).astype(int).tolist()
     keys = zip(boxes["frame"].tolist(), boxes["id"].tolist(), boxes["view"].tolist(), strict=True)
     return {key: dict(zip(_NOT_SEEN, values, strict=True)) for key, values in zip(keys, edges, strict=True)}
 

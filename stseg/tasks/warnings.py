@@ -125,7 +125,7 @@ def _moved(run: Run) -> list[str]:
     """One sentence for each colour view whose image moved by a pixel or more."""
     frames, sample = np.unique(run.shifts["frame"], return_inverse=True)
     shift = np.full((len(frames), len(run.cameras)), np.nan)
-    shift[sample, run.shifts["view"]] = np.hypot(run.shifts["u"], run.shifts["v"])
+    shift[sample, run.shifts["view"]] = np.hypot(*(run.shifts[axis] for axis in "uv"))
     return [
         f"view {run.cameras[knock.view]} was moved about frame {frames[knock.frame]}: its picture by "
         f"{knock.before - knock.after:.0f} pixels"

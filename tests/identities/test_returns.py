@@ -10,7 +10,7 @@ from refusals import refused
 from run_files import write_small_run
 from simulated_people import BORDER, CONFIG, RATE, committed, rows_of, straight
 
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Floats, Ints, Rows
 from stseg.config import Config
 from stseg.engine.offline.known import digest, read_known
 from stseg.errors import ConfigError, FormatError, InputError
@@ -142,7 +142,8 @@ def test_who_comes_back_has_one_id_and_the_events_say_so() -> None:
     assert set(after.identity.tolist()) == {1, 2, 3, 4, 5}
     np.testing.assert_array_equal(after.identity == 1, np.isin(before.identity, (1, 6)))
     assert set(after.trajectory["id"].tolist()) == {1, 2, 3, 4, 5}
-    assert (np.diff(after.trajectory["frame"] * 10 + after.trajectory["id"]) > 0).all()
+    order: Ints = after.trajectory["frame"] * 10 + after.trajectory["id"]
+    assert (np.diff(order) > 0).all()
     for name in ("x", "y", "xx"):
         np.testing.assert_array_equal(np.sort(after.trajectory[name]), np.sort(before.trajectory[name]))
     own = after.events[after.events["id"] == 1]

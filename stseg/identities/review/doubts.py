@@ -86,7 +86,8 @@ def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
         common, in_a, in_b = np.intersect1d(rows[a]["frame"], rows[b]["frame"], return_indices=True)
         if not len(common):
             continue
-        distance = np.hypot(rows[a]["x"][in_a] - rows[b]["x"][in_b], rows[a]["y"][in_a] - rows[b]["y"][in_b])
+        offset: list[Floats] = [rows[a][axis][in_a] - rows[b][axis][in_b] for axis in ("x", "y")]
+        distance = np.hypot(*offset)
         encounter = common[distance < _ENCOUNTER_DISTANCE]
         for part in np.split(encounter, np.flatnonzero(np.diff(encounter) > frame_rate) + 1):
             if len(part):
