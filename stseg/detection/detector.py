@@ -116,26 +116,10 @@ class Detector:
         return FrameEvidence(self.views, observations, prior, self.parameters, self.pixel_lattice)
 
     def explain(
-        self,
-        views: Sequence[ViewEvidence],
-        predicted: PredictedTracks | None,
-        proposals: Candidates | None = None,
-        noise: BoxNoise | None = None,
+        self, views: Sequence[ViewEvidence], predicted: PredictedTracks | None, proposals: Candidates | None = None
     ) -> Explanation:
-        """Explain one frame under the configured population.
-
-        Parameters
-        ----------
-        views
-            Evidence of each view.
-        predicted
-            Tracks of earlier frames; None in a first frame, where births cost nothing.
-        proposals
-            Candidates from elsewhere, best first: added to those of the first round's lattice, but for duplicates.
-        noise
-            Noise of boxes; by default the first guess.
-        """
-        evidence = self._evidence(self.observe(views, noise), self.body, predicted)
+        """Explain one frame as `explain_next`, by first guesses alone: of a session that has learned nothing."""
+        evidence = self._evidence(self.observe(views), self.body, predicted)
         return explained_frame(self._search.whole(self._search.of_tracks(evidence), proposals))
 
     def explain_next(
@@ -148,8 +132,10 @@ class Detector:
     ) -> Explanation:
         """Explain a session's next frame by the views that are not excluded, and update what the session has learned.
 
-        `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`). A
-        frame in which a view begins to fail is explained again without it.
+        `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`).
+        `predicted` are the tracks of earlier frames; None in a first frame, where births cost nothing. `proposals` are
+        candidates from elsewhere, best first: added to those of the first round's lattice, but for duplicates. A frame
+        in which a view begins to fail is explained again without it.
         """
         observations, failures = self.observe(views, learned.box_noise.noise), learned.failures
         failures.begin(predicted, self.views, observations)

@@ -15,7 +15,6 @@ evidence supports them, and boxes at the border of the image, which are cut ther
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 
 import numpy as np
 
@@ -63,14 +62,6 @@ class BoxNoiseEstimate:
     @property
     def noise(self) -> BoxNoise:
         """The noise by all frames so far."""
-        return self._estimated() if self.offsets.sums[:, 0].any() else self._first
-
-    @cached_property
-    def _first(self) -> BoxNoise:
-        """The noise before any box is counted; that of a rig without boxes in all of its frames."""
-        return self._estimated()
-
-    def _estimated(self) -> BoxNoise:
         first = PRIOR_NOISE.spread**2
         both = PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW] + PRIOR_NOISE.spread[:, LOWER_EDGE_ABOVE]
         first[:, LOWER_EDGE_BELOW:] *= PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW:] / both[:, None]

@@ -68,12 +68,12 @@ def test_names_that_are_final_early_belong_to_one_hypothesis() -> None:
 
 
 def test_what_comes_later_counts_where_a_track_is_certain() -> None:
-    """Two are exchanged by the filter while they stand together, unmeasured: one hypothesis has to be the right one."""
+    """Two are exchanged by the filter while they stand together, unmeasured: both readings are kept until they part."""
     true = rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), 1.85, range(160))}, noise=0.0)
     true["height"][(true["frame"] >= 66) & (true["frame"] < 110)] = np.nan
     true["xx"] = true["yy"] = 0.02
     seen = seen_of(swapped(true, 80))
-    names, apart = found(seen, hypotheses=1), np.abs(seen.ground[:, 0]) > 0.5
+    names, apart = found(seen), np.abs(seen.ground[:, 0]) > 0.5
     assert len(np.unique([names[apart], true["id"][seen.order][apart]], axis=1).T) == 2
 
 

@@ -55,7 +55,6 @@ WHOLE: dict[str, tuple[str, Any]] = {
 }
 """Mechanisms of whole runs: what is patched, and with what."""
 FINAL: dict[str, tuple[str, Any]] = {
-    "sizes foreseen": (f"{_OBSERVED}.Observations.with_foreseen_sizes", lambda observed: observed),
     "certain rows": (f"{_OBSERVED}._certain", lambda rows, _: np.zeros(len(rows), bool)),
     "short tracks dropped": (f"{_FINAL}.drop_short", lambda rows, *_: (rows, _NO_EVENTS)),
     "short gaps filled": (f"{_FINAL}.interpolated_rows", lambda rows, *_: rows[:0]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -61,27 +61,8 @@ class Observations:
     def rows(self) -> ObservedRows:
         """The observations for kernels, with a random number of each row."""
         drawn = np.random.default_rng(0).integers(1 << 61, size=len(self.order)) * 2 + 1
-        return ObservedRows(
-            self.ground,
-            self.variance,
-            self.previous,
-            self.certain,
-            self.inside,
-            self.precision,
-            self.information,
-            drawn,
-        )
-
-    def with_foreseen_sizes(self) -> Observations:
-        """The same, with the size evidence of each unambiguous part of a track moved to its first observation.
-
-        The score of a whole hypothesis stays as it is, but each decision has the evidence that comes after it.
-        """
-        head = _heads(self.previous, self.certain)
-        precision, information = np.zeros_like(self.precision), np.zeros_like(self.information)
-        np.add.at(precision, head, self.precision)
-        np.add.at(information, head, self.information)
-        return replace(self, precision=precision, information=information)
+        places = self.ground, self.variance, self.previous, self.certain, self.inside
+        return ObservedRows(*places, self.precision, self.information, drawn)
 
     @cached_property
     def number(self) -> Ints:
@@ -134,14 +115,6 @@ def observe(
         _certain(rows, previous), border.inside(ground, config.detection.border_width), precision,
         information,
     )  # fmt: skip
-
-
-def _heads(previous: Ints, follows: Flags) -> Ints:
-    """First observation of the chain of each (n,), in which those that follow are linked to the one before them."""
-    head = np.arange(len(previous))
-    for row in np.flatnonzero(follows).tolist():
-        head[row] = head[previous[row]]
-    return head
 
 
 def _previous(rows: Rows) -> Ints:

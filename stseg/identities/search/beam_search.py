@@ -129,7 +129,7 @@ def search_identities(
     people = KnownPeople.of(constraints, frame)
     # Frames with constraints lose their certain rows: a constraint may overrule them.
     certain = observations.certain & ~np.isin(frame, people.decided(frame))
-    observations = replace(observations, certain=certain).with_foreseen_sizes()
+    observations = replace(observations, certain=certain)
     slots = int(np.diff(observations.start).max(initial=0)) + _SPARE + people.most_open()
     most = limits.hypotheses
     hypotheses, spare = (
