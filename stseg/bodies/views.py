@@ -145,7 +145,6 @@ class BoxView(View):
             fill_inside(bodies, width, height, row)
         self.index = PillarIndex.of(self.bodies, camera.size)
         self.found = np.where(inside > _LEAST_INSIDE, self.found_share(inside), 0.0).reshape(-1)
-        self.best_fit = np.full(self.found.shape, -np.inf)  # scratch of `stseg.detection.evidence.box_lattice`
 
     def found_share(self, visible: Floats) -> Floats:
         """Detection rate of a body by its visible share, relative to that of a whole one."""

@@ -28,22 +28,23 @@ class BoxLattice:
 
     def __init__(self, views: dict[int, tuple[BoxView, ViewObservation]], prior: Floats) -> None:
         self._views, self._prior, self._without = views, prior, prior.copy()
-        self._fits = {view: dict[int, tuple[Labels, Floats]]() for view in views}
-        for view, _ in views.values():
-            _add_scores(np.arange(len(prior)), view.best_fit, view.found, view.config.box_log_ratio, self._without)
+        self._fits = {number: dict[int, tuple[Labels, Floats]]() for number in views}
+        self._best = {number: np.full(len(prior), -np.inf) for number in views}
+        for number, (view, _) in views.items():
+            _add_scores(np.arange(len(prior)), self._best[number], view.found, view.config.box_log_ratio, self._without)
 
     def score(self, assigned: Sequence[Ints]) -> Floats:
         """Score of each pillar by the boxes that are free, -1 in the assigned (box,) of their view: nats."""
         score, is_open = self._without.copy(), np.zeros(len(self._prior), bool)
-        for number, (view, _) in self._views.items():
+        for number in self._views:
             for box in np.flatnonzero(assigned[number] < 0).tolist():
                 if box not in self._fits[number]:
                     self._fits[number][box] = self._fits_of(number, box)
-                _raise_to(*self._fits[number][box], view.best_fit, is_open)
+                _raise_to(*self._fits[number][box], self._best[number], is_open)
         pillars = np.flatnonzero(is_open)
         score[pillars] = self._prior[pillars]
-        for view, _ in self._views.values():
-            _add_scores(pillars, view.best_fit, view.found, view.config.box_log_ratio, score)
+        for number, (view, _) in self._views.items():
+            _add_scores(pillars, self._best[number], view.found, view.config.box_log_ratio, score)
         return score
 
     def _fits_of(self, number: int, box: int) -> tuple[Labels, Floats]:
