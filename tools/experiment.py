@@ -4,6 +4,7 @@ ablation    what each special case of detection and tracking earns, off one at a
 compilers   do the ways in which kernels are compiled agree?
 few_views   two and three views of everything: scores, and how many of the points the run takes for wrong
 perturbed   mean and spread of scores over runs with perturbed area, grid, cameras and boxes
+rig_scale   how well automatic rigs know their scale
 same        do two commits give the same bits?
 scaling     CPU time of a frame over area, views, people and pixels, with exponents
 spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
@@ -14,7 +15,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("ablation", "compilers", "few_views", "perturbed", "same", "scaling", "spoil")
+EXPERIMENTS = ("ablation", "compilers", "few_views", "perturbed", "rig_scale", "same", "scaling", "spoil")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

@@ -219,7 +219,7 @@ def _require_ground(solution: SolvedViews, known: Sequence[KnownDistance]) -> No
     """Raise ConfigError for a distance whose pixels do not show the ground."""
     for number, metres in enumerate(measured(solution, known), start=1):
         if not np.isfinite(metres):
-            raise ConfigError("--distance", str(number), "a pixel above the horizon", "pixels that show the ground")
+            raise ConfigError("--distance", str(number), "a pixel that shows no ground", "pixels where people walk")
 
 
 def _frame_range(frames: tuple[int | None, int | None] | None, length: int) -> tuple[int, int]:
