@@ -58,6 +58,12 @@ def strips(draw: st.DrawFn) -> Pillars:
     return Pillars(upright, one, two, three, base)
 
 
+EDGE, MIDDLE, HALF = (np.array([part], np.float32) for part in ([0, 0, 1], [0, -0.375], [1, 0.5]))
+NARROW = Pillars(np.array([False]), EDGE, MIDDLE, HALF, 0)
+"""A pillar whose widest form, rounded to pixels, misses an image that a narrower one meets."""
+
+
+@example(np.ones((3, 3), np.float32), NARROW, 0.5)
 @drawn(60, maps(), strips(), numbers(0.01, 0.5))
 def test_the_kernel_is_the_definition(likelihood: Singles, pillars: Pillars, outside: float) -> None:
     rng, widths = np.random.default_rng(0), np.array([0.2, 0.3, 0.4])

@@ -182,7 +182,7 @@ def fill_chance(
                 if k >= base and covered[j] > 0:
                     omega = (foreground[j] / TOP_LEVEL + outside * (covered[j] - within[j])) / covered[j]
                     total += height_share[k - base] * width_share[j] * omega
-        if within[-1] > 0:
+        if within.max() > 0:  # rounded to pixels, the widest pillar may miss an image that a narrower one meets
             chance[i] = total
 
 
