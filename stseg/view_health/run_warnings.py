@@ -106,7 +106,7 @@ def _sizes(trajectory: Rows, body: BodyConfig) -> list[str]:
     if width > usual + _WIDTH_DEVIATIONS * body.width_spread:
         return [
             f"bodies are {width:.2f} m wide in the median, {usual:.2f} m were expected: are the masks too wide? "
-            "[body] in the rig says whom the cameras watch"
+            "[body] in the rig has the sizes to expect"
         ]
     return []
 

@@ -116,14 +116,18 @@ def test_names_that_no_file_can_have_are_refused(tmp_path: Path, name: str) -> N
 VIVID = (20, 240, 160)
 
 
+def vivid_sources(folder: Path, rows: int, columns: int) -> tuple[CameraSource, ...]:
+    """Two cameras with 16 frames of one vivid colour."""
+    folder.mkdir()
+    for frame in range(16):
+        cv2.imwrite(str(folder / f"{frame:03d}.png"), np.full((rows, columns, 3), VIVID, np.uint8))
+    return (CameraSource(Source("images", folder)),) * 2
+
+
 @pytest.fixture
 def filmed_run(tmp_path: Path) -> Path:
     """A run with camera images of one vivid colour."""
-    folder = tmp_path / "frames"
-    folder.mkdir()
-    for frame in range(16):
-        cv2.imwrite(str(folder / f"{frame:03d}.png"), np.full((12, 16, 3), VIVID, np.uint8))
-    sources = (CameraSource(Source("images", folder)),) * 2
+    sources = vivid_sources(tmp_path / "frames", 12, 16)
     recording = replace(run_files.small_recording(tmp_path), sources=sources)
     return run_files.write_small_run(tmp_path / "filmed.h5", recording=recording)
 
@@ -263,12 +267,8 @@ def front_camera(name: str, x: float) -> Camera:
 @pytest.fixture
 def recording(tmp_path: Path) -> Recording:
     """Two cameras with frames of one vivid colour."""
-    folder = tmp_path / "frames"
-    folder.mkdir()
-    for frame in range(16):
-        cv2.imwrite(str(folder / f"{frame:03d}.png"), np.full((240, 320, 3), VIVID, np.uint8))
     rig = Rig("hall", 5.0, Grid((0, 4), (-1, 2), 0.5, 1.8, 3), (front_camera("left", 1), front_camera("right", 3)))
-    return Recording(tmp_path / "rig.toml", rig, (CameraSource(Source("images", folder)),) * 2)
+    return Recording(tmp_path / "rig.toml", rig, vivid_sources(tmp_path / "frames", 240, 320))
 
 
 def walk() -> Rows:
