@@ -66,12 +66,11 @@ def read_tracks_csv(path: Path) -> Rows:
 
 def write_tracks_csv(path: Path, trajectory: Rows, overwrite: bool = False) -> None:
     """Write a TRAJECTORY table as frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm."""
-    _write(path, trajectory, _WRITTEN, overwrite)
-
-
-def write_truth_csv(path: Path, truth: Rows, overwrite: bool = False) -> None:
-    """Write a POSITION table as frame, id, x, y, flag; positions to 0.1 mm."""
-    _write(path, truth, {name: _WRITTEN.get(name, "%d") for name in (*_NEEDED, "flag")}, overwrite)
+    header = ",".join(_WRITTEN) + "\n"
+    require_output(Path(path), overwrite, table=header)
+    with replacing(Path(path), overwrite) as part, part.open("w", newline="", encoding="utf-8") as file:
+        file.write(header)
+        np.savetxt(file, trajectory[list(_WRITTEN)], fmt=",".join(_WRITTEN.values()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,12 +163,3 @@ def _repeats(table: Rows) -> Flags:
     repeats = np.zeros(len(table), bool)
     repeats[order[1:]] = (frame[1:] == frame[:-1]) & (identity[1:] == identity[:-1])
     return repeats
-
-
-def _write(path: Path, table: Rows, columns: dict[str, str], overwrite: bool) -> None:
-    """Write the columns, each in its format."""
-    header = ",".join(columns) + "\n"
-    require_output(Path(path), overwrite, table=header)
-    with replacing(Path(path), overwrite) as part, part.open("w", newline="", encoding="utf-8") as file:
-        file.write(header)
-        np.savetxt(file, table[list(columns)], fmt=",".join(columns.values()))

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io.track_csv import POSITION, write_truth_csv
+from stseg.io.track_csv import POSITION
 
-__all__ = ["WILDTRACK_VIEWS", "cmc_truth", "wildtrack_annotated_boxes", "wildtrack_truth", "write_truth_csv"]
+__all__ = ["WILDTRACK_VIEWS", "cmc_truth", "wildtrack_annotated_boxes", "wildtrack_truth"]
 
 WILDTRACK_VIEWS = ("CVLab1", "CVLab2", "CVLab3", "CVLab4", "IDIAP1", "IDIAP2", "IDIAP3")
 """Names of viewNum 0..6."""
@@ -71,4 +71,4 @@ if __name__ == "__main__":
         wildtrack_annotated_boxes(Path(source), Path(output))
     else:
         truth = {"cmc-truth": cmc_truth, "wildtrack-truth": wildtrack_truth}[what](Path(source))
-        write_truth_csv(Path(output), truth, overwrite=True)
+        np.savetxt(output, truth, "%d,%d,%.4f,%.4f,%d", header="frame,id,x,y,flag", comments="")

@@ -57,9 +57,11 @@ def _read(request: Request, path: Path) -> tuple[str, Detections] | None:
         return _read_folder(request)
     require_regular(path)
     suffix = path.suffix.lower()
-    if suffix in (".json", ".jsonl", ".ndjson"):
+    with path.open("rb") as file:
+        beginning = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")[:1]
+    if beginning in (b"{", b"[") or suffix in (".json", ".jsonl", ".ndjson"):
         return _read_json(request, read_json(path))
-    if suffix == ".xml":
+    if beginning == b"<" or suffix == ".xml":
         return "CVAT XML", annotation_tools.read_cvat(request)
     if suffix == ".parquet":
         return "Parquet", tables.read_parquet(request)

@@ -16,7 +16,7 @@ from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
 from stseg.records.tables import ERROR_RATES
-from stseg.tasks.overview import Overview, per, summarise_run
+from stseg.tasks.overview import Overview, summarise_run
 from stseg.tasks.slices import write_slice
 from stseg.tasks.sources import COLUMNS, recording_warnings, summarise_sources, write_source_pictures
 
@@ -128,7 +128,7 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
         ("ghosts", "; ".join(f"{count} because {words}" for words, count in ranked if count) or "none"),
         ("windows", f"{o.windows}, {o.frames_per_window:.1f} frames each"),
-        ("time", f"{total:.1f} s" + (f", {per(o.frames, 1) / total:.1f} frames/s" if total else "")),
+        ("work", f"{total:.1f} s, the sum over all workers and threads"),
         ("stages", ", ".join(stages) or "none"),
         ("size", f"{o.bytes / 1e6:.1f} MB, {o.bytes_per_frame / 1e3:.1f} kB a frame"),
     ]

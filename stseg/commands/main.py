@@ -10,6 +10,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 from io import TextIOWrapper
+from itertools import pairwise
 from typing import Literal, NoReturn
 
 from cyclopts import App, CycloptsError, MissingArgumentError
@@ -42,6 +43,9 @@ COMMANDS = {
 }
 """Location of each command, and its line in `stseg --help`."""
 
+_FILES = ("-o", "--output", "--video")
+"""Options that name a file to write, but for these commands."""
+_WRITERS_OF_FOLDERS = ("detect", "inspect", "labels", "measure")
 _FLAGS = ("--help", "-h", "--version")
 _USER_ERROR = 2
 _ADDRESS_SPACE = 2 * 2**30
@@ -90,6 +94,7 @@ def _run(tokens: list[str]) -> int:
     termination = Termination()
     try:
         _require_command(tokens)
+        _require_file_names(tokens)
         _app(tokens)(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except MissingArgumentError as error:
@@ -122,7 +127,7 @@ def _missing(error: MissingArgumentError, tokens: Sequence[str]) -> str:
     if not names or any(token.partition("=")[0] in names for token in tokens):
         return str(error)
     command = " ".join(error.command_chain or ())
-    return f"command line: {names[0]}: found nothing, expected it; see stseg {command} --help"
+    return f"command line: {names[0]} is missing; see stseg {command} --help"
 
 
 def _fail(message: str) -> int:
@@ -178,6 +183,13 @@ def _require_command(tokens: Sequence[str]) -> None:
         close = get_close_matches(tokens[0], COMMANDS, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
         raise ConfigError("command line", "", repr(tokens[0]), f"one of {', '.join(COMMANDS)}{hint}")
+
+
+def _require_file_names(tokens: Sequence[str]) -> None:
+    """Refuse the name of a folder for an output that is a file: paths drop the slash at its end."""
+    for option, value in pairwise(tokens):
+        if option in _FILES and value.endswith(os.sep) and tokens[0] not in _WRITERS_OF_FOLDERS:
+            raise ConfigError("command line", option, f"the name of a folder, {value!r}", "the name of a file")
 
 
 def completion(shell: Literal["bash", "zsh", "fish"], /) -> None:

@@ -35,7 +35,7 @@ def review(
     output
         The page.
     most
-        Number of questions.
+        Number of questions at most; decisions that are more than 99 % certain are not asked about.
     camera_images
         Show the cameras' frames under the tracks. The page then holds images of people.
     overwrite

@@ -15,6 +15,8 @@ from stseg.evaluation.alignment import best_motion, ground_of, moved_rows, numbe
 
 _MATCHING, _GAIN = 0.5, 0.3
 """Least share of the truth's rows that meet tracks under a reading that is named, and least gain over the given one."""
+_MOVED_MATCHING = 0.75
+"""The same where the truth is turned and scaled at will: that fits half of any two crowds."""
 _ALIEN_SHARE = 0.05
 """Share of the truth's rows that meet tracks below which it may be of another recording."""
 _UNITS = {"": 1.0, "in millimetres": 1e-3, "in centimetres": 1e-2, "in kilometres": 1e3, "in feet": 0.3048}
@@ -43,7 +45,7 @@ def reading_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
     for reading, rows in _readings(truth, trajectory, gate):
         share = number_met(tree, rows, gate) / len(truth)
         given = given if reading else share
-        if share > best + 1e-9:
+        if share > best + 1e-9 and ("turned" not in reading or share > _MOVED_MATCHING):
             best, words = share, reading
     if best < max(_MATCHING, given + _GAIN):
         alien = "tracks meet hardly a row of the truth: is it of this recording, with its frames, and in metres?"

@@ -51,16 +51,9 @@ class Instant:
 def ground_figures(
     rig: Rig, views: Bytes, trajectory: Rows, truth: Rows | None, names: Mapping[int, str]
 ) -> list[Figure]:
-    """The plan view and the space-time picture.
+    """The plan view and the space-time picture of TRAJECTORY (n,), and of a truth (m,) with frame, id, x, y.
 
-    Parameters
-    ----------
-    views : uint8 (plane, y, x)
-        Number of views that see each cell.
-    trajectory : TRAJECTORY (n,)
-    truth : (m,) with frame, id, x, y, or None
-    names
-        Of tracks, by id.
+    `views` uint8 (plane, y, x) counts the views that see each cell; `names` are of tracks, by id.
     """
     plan = plan_view(rig, trajectory, truth, views.max(axis=0), rig.name, *_PLAN_SIZE, names)
     thread = spacetime_picture(rig.grid, trajectory, rig.frame_rate, rig.name)
@@ -95,18 +88,9 @@ def camera_figures(rig: Rig, trajectory: Rows, instant: Instant) -> list[Figure]
 
 
 def backdrop(view: Observation, size: tuple[int, int]) -> Bytes | None:
-    """A camera's frame as `overlay` takes it: colour and masks as they are, instances and boxes as masks.
+    """A camera's frame as `overlay` takes it, uint8 (v, u, 3) or (v, u): instances and boxes as masks.
 
-    Parameters
-    ----------
-    view
-        Observation of the camera.
-    size
-        Width and height of its image, pixels.
-
-    Returns
-    -------
-    uint8 (v, u, 3) or (v, u), or None
+    `size` is width and height of its image, pixels.
     """
     if view is None:
         return None
@@ -121,17 +105,11 @@ def backdrop(view: Observation, size: tuple[int, int]) -> Bytes | None:
 
 _MAX_VIEW_WIDTH, _MAX_WIDTH = 960, 1280  # width of a view, and of all views side by side, pixels
 _MIN_HEIGHT = 720  # of the film, pixels
+_SCREEN_SHAPE = 16 / 9  # width by height: the plan is beside the views or below, where a screen shows the film larger
 
 
 class RunFilm:
-    """A film's pictures, all of one size.
-
-    Parameters
-    ----------
-    views : uint8 (plane, y, x)
-        Number of views that see each cell.
-    trajectory : TRAJECTORY (n,)
-    """
+    """A film's pictures, all of one size, of TRAJECTORY (n,); `views` uint8 (plane, y, x) see each cell."""
 
     def __init__(self, rig: Rig, views: Bytes, trajectory: Rows) -> None:
         self._rig = rig
@@ -144,7 +122,8 @@ class RunFilm:
         rows = -(-count // self._columns)
         views_size = self._columns * self._wide, rows * self._tall
         side, foot = plan_map(rig, _MIN_HEIGHT, max(views_size[1], _MIN_HEIGHT), 0), plan_map(rig, *views_size, 0)
-        is_below = foot.scale > side.scale
+        width = max(views_size[0] + side.size[0], _SCREEN_SHAPE * max(views_size[1], side.size[1]))
+        is_below = max(views_size[0], _SCREEN_SHAPE * (views_size[1] + foot.size[1])) < width
         self._plan = foot if is_below else side
         self._corner = (views_size[0] - foot.size[0]) // 2 if is_below else views_size[0], views_size[1] * is_below
         self._ground, _ = ground_sheet(self._plan, rig, views.max(axis=0), rig.name)
@@ -154,13 +133,7 @@ class RunFilm:
         """Width and height, pixels; both even, as video wants them."""
 
     def picture(self, frame: int, views: Sequence[Observation]) -> Picture:
-        """One frame.
-
-        Parameters
-        ----------
-        views
-            Observation of each camera, in the rig's order; None shows the ruled ground instead.
-        """
+        """One frame with each camera's observation, in the rig's order; None shows the ruled ground instead."""
         first, stop = np.searchsorted(self._rows["frame"], [frame - self._trail, frame + 1])
         recent = self._rows[first:stop]
         canvas = blank(*self.size, PAPER)

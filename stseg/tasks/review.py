@@ -23,6 +23,8 @@ from stseg.reporting.page.review_page import Question, best_views, moment_pictur
 from stseg.tasks.correction import answered_before, is_solved_again
 from stseg.tasks.report import read_views
 
+_LEAST_CHANCE = 0.01
+"""Probability that a decision is wrong from which on it is asked about."""
 _WEIGHED_DECISIONS = 300
 """Decisions that are weighed so, those with the least margins by heights and motion alone; the others come after."""
 
@@ -60,7 +62,7 @@ def write_review(run_file: Path, output: Path, *, most: int, camera_images: bool
     run = read_run(run_file)
     require_output(output, overwrite, Inputs(run.files))
     run.require_fit()
-    doubts = doubtful_decisions(run)[:most]
+    doubts = [one for one in doubtful_decisions(run) if one.chance >= _LEAST_CHANCE][:most]
     frames = sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)})
     views = read_views(run.recording, frames) if camera_images and doubts else {}
     questions = [_question(run, doubt, views) for doubt in doubts]
@@ -96,10 +98,10 @@ def _question(run: Run, doubt: Doubt, views: Mapping[int, tuple[Observation, ...
         if views
     ]
     first, last = moments[0][1] - round(run.frame_rate), moments[2][1] + round(run.frame_rate)
-    film = plan_film(run.trajectory, first, last, run.frame_rate, ids)
+    film = plan_film(run.trajectory, first, last, doubt.first, run.frame_rate, ids)
     (x, y), seconds = ground.mean(axis=0), doubt.first / run.frame_rate
-    words, choices = question_words(doubt)
-    at = f"{words} At {clock_time(seconds)}, near ({x:.1f}, {y:.1f})."
+    (words, choices), wrong = question_words(doubt), f"wrong with a probability of {100 * doubt.chance:.0f} %"
+    at = f"{words} At {clock_time(seconds)}, near ({x:.1f}, {y:.1f}); the run is {wrong}."
     return Question(at, [*choices, ("0", "cannot tell", "")], pictures, film)
 
 

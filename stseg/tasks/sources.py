@@ -172,5 +172,5 @@ def _span(values: Floats, form: str) -> str:
     """The 5th to the 95th percentile."""
     if not len(values):
         return ""
-    low, high = np.percentile(values, (5, 95))
-    return f"{form.format(low)}-{form.format(high)}"
+    low, high = map(form.format, np.percentile(values, (5, 95)))
+    return low if low == high else f"{low}-{high}"

@@ -20,8 +20,8 @@ from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 _BLIND_SHARE = 0.05
 """Share of the ground that no view sees from which there is a warning."""
-_CHECKED_FRAMES = 50
-"""Frames by which swapped cameras are found where a view looks wrong."""
+_CHECKED_FRAMES = 160
+"""Frames by which swapped cameras are found where a view looks wrong; by 50, four people did not always show it."""
 _MOVED = 1.0
 """Least shift of an image that counts as a moved camera, pixels."""
 

@@ -19,15 +19,7 @@ _SILENT_SHARE = 0.1
 def view_warnings(cameras: Sequence[str], candidates: Rows, frames: Ints, frame_rate: float) -> list[str]:
     """Warnings of views without evidence, with gaps, against what the others agree on, or with falling evidence.
 
-    Parameters
-    ----------
-    cameras
-        Their names.
-    candidates : rows (n,) with frame, status, parts
-    frames : int64 (time,)
-        The run's frames.
-    frame_rate
-        Frames per second.
+    `candidates` (n,) have the columns frame, status, parts; `frames` int64 (time,) are the run's, at frames per second.
     """
     if not len(candidates) or not len(frames):
         return []
@@ -55,7 +47,8 @@ def _silent_interval(name: str, frame: Ints, evidence: Floats, frames: Ints, fra
     if missed < max(_LEAST_CANDIDATES, _SILENT_SHARE * len(frames)):
         return []
     seconds = (stop - start) / frame_rate
-    return [f"view {name} has no evidence in frames {start} to {stop - 1} ({seconds:.0f} s): did it end, or fail?"]
+    frames_named = f"frames {start} to {stop - 1} ({seconds:.0f} s)"
+    return [f"view {name} has no evidence in {frames_named}: did it end, fail, or was it excluded?"]
 
 
 def _weak_support(name: str, frame: Ints, evidence: Floats, frames: Ints) -> list[str]:
@@ -81,19 +74,7 @@ _TORN_MISS_RATE = 0.3
 
 
 def body_warnings(cameras: Sequence[str], trajectory: Rows, rates: Rows, body: BodyConfig) -> list[str]:
-    """Warnings of a run's bodies.
-
-    Parameters
-    ----------
-    cameras
-        Their names.
-    trajectory : TRAJECTORY (n,)
-        The run's people.
-    rates : RATES (n,)
-        Its learned error rates.
-    body
-        The configured population.
-    """
+    """Warnings of a run's bodies: TRAJECTORY (n,) and learned RATES (m,), against the configured population."""
     return _sizes(trajectory, body) + _torn(cameras, rates)
 
 
@@ -105,7 +86,7 @@ def _sizes(trajectory: Rows, body: BodyConfig) -> list[str]:
     usual = float(body.width_of(np.array([height]))[0])
     if width > usual + _WIDTH_DEVIATIONS * body.width_spread:
         return [
-            f"bodies are {width:.2f} m wide in the median, {usual:.2f} m were expected: are the masks too wide? "
+            f"bodies are {width:.2f} m wide in the median, {usual:.2f} m were expected: is the foreground too wide? "
             "[body] in the rig has the sizes to expect"
         ]
     return []
@@ -116,5 +97,6 @@ def _torn(cameras: Sequence[str], rates: Rows) -> list[str]:
     for view, name in enumerate(cameras):
         miss = rates["miss"][rates["view"] == view]
         if len(miss) and (share := float(np.median(miss))) > _TORN_MISS_RATE:
-            warnings.append(f"view {name} misses {100 * share:.0f} % of people's bodies: are its masks torn or narrow?")
+            words = f"view {name} misses {100 * share:.0f} % of people's bodies"
+            warnings.append(f"{words}: is its foreground torn, or are boxes missing?")
     return warnings

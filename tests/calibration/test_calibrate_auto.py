@@ -293,7 +293,7 @@ def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.Captur
         film(video, endpoints, 100)
     output = tmp_path / "rig.toml"
     distance = ("a,150,250,300,260,3",)
-    calibrate_auto(*videos, output=output, frame_rate=5.0, source_kind="masks", most_delay=0.0, distance=distance)
+    calibrate_auto(*videos, output=output, source_kind="masks", most_delay=0.0, distance=distance)
     recording = read_recording(output)
     assert [camera.name for camera in recording.rig.cameras] == ["a", "b"]
     ground = recording.rig.cameras[0].back_project(np.array([[150.0, 250.0], [300.0, 260.0]]))
@@ -321,6 +321,9 @@ def test_videos_need_different_names_and_more_than_one(tmp_path: Path) -> None:
     a, b, rig = (tmp_path / name for name in ("a.avi", "b.avi", "rig.toml"))
     refused(ConfigError, "two or more, with different names", calibrate_auto, a, output=rig, frame_rate=5.0)
     refused(SourceError, "no such file", calibrate_auto, a, b, output=rig, frame_rate=5.0)
+    for path, rate in ((a, 5.0), (b, 4.0)):
+        write_at_rate(path, [np.zeros((48, 64, 3), np.uint8)] * 5, rate)
+    refused(ConfigError, "--frame-rate: found 4 and 5 by the heads", calibrate_auto, a, b, output=rig)
 
 
 SPEC = SceneSpec("walking", 2, (6.0, 6.0), 40.0, 5.0, 2, seed=1, distortion=(-0.2, 0.03))

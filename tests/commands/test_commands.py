@@ -235,12 +235,14 @@ def test_every_background_model_can_be_asked_for(demo: Demo, tmp_path: Path, mod
 
 def test_tables_are_whole_in_a_pipe(run_path: Path, stdout: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "20")
-    (line,) = [line for line in stdout("inspect", run_path).splitlines() if line.startswith("scene")]
-    assert "run of 20" in line
+    lines = stdout("inspect", run_path).splitlines()
+    assert "run of 20" in next(line for line in lines if line.startswith("scene"))
+    assert not any(line.endswith(" ") for line in lines)
 
 
 def test_an_option_that_was_left_out_is_missing(refusal: Command) -> None:
-    assert "command line: -o: found nothing, expected it; see stseg run --help" in refusal("run", "rig.toml")
+    assert "command line: -o is missing; see stseg run --help" in refusal("run", "rig.toml")
+    assert "found the name of a folder, 'pics/'" in refusal("report", "run.h5", "-o", "pics/")
     assert "requires an argument" in refusal("run", "rig.toml", "-o")
 
 

@@ -60,6 +60,8 @@ def test_bad_tracks_get_no_advice(tracks: Rows) -> None:
     strange["x"] = low + np.abs((steps - low) % (2 * (high - low)) - (high - low))
     strange["y"] = chance.permutation(strange["y"])
     assert reading_advice(strange, tracks, GATE) is None
+    room = read_tracks_csv(data_path("laboratory/truth.csv"))
+    assert "turned" not in str(reading_advice(room[room["frame"] < 100], tracks, GATE)), "any crowds fit in part"
 
 
 def test_the_command_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import astuple
 from pathlib import Path
+from unittest.mock import patch
 
 import h5py
 import numpy as np
@@ -91,13 +92,17 @@ def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys:
     run = write_small_run(tmp_path / "run.h5")
     review(run, output=tmp_path / "review.html")
     assert "1 questions" in capsys.readouterr().out
+    with patch("stseg.tasks.review._LEAST_CHANCE", 1.0):
+        review(run, output=tmp_path / "certain.html")
+    assert "0 questions" in capsys.readouterr().out, "what is certain is not asked"
     with chromium(tmp_path / "profile") as page:
         page.open(tmp_path / "review.html")
         drawn = page.picture(1280, 900)
         page.ask("dispatchEvent(new KeyboardEvent('keydown', { key: ' ' })), 0")
         page.wait_for("document.getElementById('slider').value === document.getElementById('slider').max")
         assert page.picture(1280, 900) != drawn
-        assert "Are 1 and 2 after the encounter" in page.ask("document.getElementById('question').textContent")
+        asked = page.ask("document.getElementById('question').textContent")
+        assert "Are 1 and 2 after the encounter" in asked and "wrong with a probability of" in asked
         page.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '2' })), 0")
         text = page.ask("document.getElementById('csv').value")
         assert page.complaints == [] and page.requests == []

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -171,7 +172,10 @@ def sample(folder: Path, name: str) -> Source:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_gives_the_same_boxes(tmp_path: Path, name: str) -> None:
-    found = read_source(sample(tmp_path, name), SIZE)
+    source = sample(tmp_path, name)
+    if (path := source.path).suffix in (".json", ".xml"):  # the content says what it is
+        source = replace(source, path=path.rename(path.with_suffix("")))
+    found = read_source(source, SIZE)
     assert name.startswith(found.format) and found.frames == 3
     for frame in range(3):
         boxes, own = found.table.at(frame), BOXES.get(frame, [])

@@ -10,7 +10,7 @@ from run_files import table_of
 from strategies import drawn
 
 from stseg.errors import FormatError, OutputError
-from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
+from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv
 from stseg.io.untrusted.values import parse_number, parse_whole
 from stseg.records.tables import TRAJECTORY
 
@@ -50,16 +50,7 @@ def test_a_line_is_short_and_readable(path: Path) -> None:
         "frame,id,x,y,height,score,xx,xy,yy,views",
         "0,4,0.3333,-2.0000,1.754,inf,0.01,-0.001234,0.02,3",
     ]
-
-
-def test_truth_keeps_its_flags(path: Path) -> None:
-    truth = np.array([(3, 1, 0.5, 0.25, 0), (4, 1, 0.5, 0.5, 2)], POSITION)
-    write_truth_csv(path, truth)
-    assert path.read_text().splitlines()[0] == "frame,id,x,y,flag"
-    assert read_tracks_csv(path).tolist() == truth.tolist()
-    refused(OutputError, "exists", write_truth_csv, path, truth)
-    write_truth_csv(path, truth[:1], overwrite=True)
-    assert read_tracks_csv(path).tolist() == truth[:1].tolist()
+    path.write_text("frame,id,x,y,flag\n3,1,0.5,0.25,0\n")
     refused(OutputError, "did not make", write_tracks_csv, path, trajectory([]), overwrite=True)
 
 

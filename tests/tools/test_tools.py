@@ -14,7 +14,6 @@ from scenes import looking, rig_of
 
 from stseg.evaluation import evaluate
 from stseg.io.recording.rigs import read_recording
-from stseg.io.track_csv import read_tracks_csv
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "tools"))
@@ -52,12 +51,11 @@ def test_the_truth_of_cmc_stands_in_its_room() -> None:
     assert truth["x"].min() > 0 and truth["x"].max() < 7.67 and np.abs(truth["y"]).max() < 4
 
 
-def test_the_truth_of_wildtrack_is_its_own_perfect_track(tmp_path: Path) -> None:
+def test_the_truth_of_wildtrack_is_its_own_perfect_track() -> None:
     truth = datasets.wildtrack_truth(data_path("wildtrack/annotations_positions"))
     assert np.unique(truth["frame"]).tolist() == list(range(200))
     assert truth["x"].min() >= -3 and truth["x"].max() <= 9 and truth["y"].min() >= -9 and truth["y"].max() <= 27
-    datasets.write_truth_csv(tmp_path / "truth.csv", truth)
-    assert evaluate(truth, read_tracks_csv(tmp_path / "truth.csv"), 0.3).hota == pytest.approx(100)
+    assert evaluate(truth, truth, 0.3).hota == pytest.approx(100)
 
 
 def test_wildtrack_has_boxes_in_every_view(tmp_path: Path) -> None:

@@ -62,21 +62,9 @@ def find_swapped_streams(
 ) -> tuple[tuple[int, int], ...]:
     """Pairs of views, with images of one size, that fit far better with their streams swapped.
 
-    Where views stand symmetrically, another pair fits as well: the people are turned about the middle. Both are given.
-
-    Parameters
-    ----------
-    tables
-        See `tables_of`.
-    frames
-        Frames to use.
-    people
-        Correspondences in those frames under the rig as it is.
-
-    Returns
-    -------
-    tuple of (view, view)
-        The best pair first; those that count as many fitting boxes, within chance, follow.
+    Where views stand symmetrically, another pair fits as well: the people are turned about the middle. Both are given,
+    the best first, of those that count as many fitting boxes within chance. `people` are the correspondences in
+    `frames` under the rig as it is, `tables` those of `tables_of`.
     """
     least, fits = _SWAP_GAIN * max(_fitting_boxes(tables, people), MIN_PEOPLE), {}
     for first, second in combinations(range(len(tables)), 2):
@@ -112,14 +100,8 @@ def find_stream_delay(
 ) -> StreamDelay | None:
     """The view with boxes that fit the others best at a different time; None where each fits best undelayed.
 
-    Parameters
-    ----------
-    boxes_by_frame
-        Boxes of all frames, without gaps.
-    people
-        Correspondences in some of them.
-    most
-        Largest delay in either direction, frames.
+    `boxes_by_frame` are those of all frames, without gaps, `people` correspondences in some of them, and `most` is the
+    largest delay in either direction, frames.
     """
     clearest, found = _DELAY_MISFIT, None
     shifts = range(-most, most + 1)

@@ -67,7 +67,7 @@ class PointFit:
     off_pixel: Floats
     """float64 (n,): reprojection error of each point, pixels."""
     off_ground: Floats
-    """float64 (n,): the same in the plane through the point along that of reference, metres; nan above its horizon."""
+    """float64 (n,): the same on the plane of reference, metres; off it, by the pixels that a metre off it covers."""
     out: Flags
     """bool (n,): outliers."""
     frame: Floats
@@ -141,8 +141,9 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     require_unmirrored(camera, projection)
     off = np.hypot(*(camera.project(points.ground, points.height)[0] - points.pixel).T)
     local = Camera.from_projection(name, size, projection, own_lens)
-    planes = zip(inner.pixel, inner.height.tolist(), strict=True)
-    off_ground = np.hypot(*(np.array([local.back_project(pixel, z) for pixel, z in planes]) - inner.ground).T)
+    on_plane = np.hypot(*(local.back_project(inner.pixel, 0.0) - inner.ground).T)
+    risen, below = (local.project(inner.ground, inner.height + up)[0] for up in (_DIFFERENCE, 0.0))
+    off_ground = np.where(inner.low, on_plane, off * _DIFFERENCE / np.hypot(*(risen - below).T))
     out = outliers(off, fit.used | inner.low)  # a point that the fit left out counts
     return PointFit(camera, points, vertical_from, off, off_ground, out, frame, inner, fit)
 

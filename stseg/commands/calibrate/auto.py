@@ -19,7 +19,7 @@ from stseg.tasks.calibration.automatic import AutomaticCalibration, Distance, ca
 def calibrate_auto(
     *videos: Annotated[Path, Parameter(metavar="VIDEO...")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
-    frame_rate: float,
+    frame_rate: float | None = None,
     person_height: float = 1.7,
     distance: Annotated[tuple[str, ...], Parameter(metavar="CAMERA,U,V,U,V,METRES", negative="")] = (),
     most_delay: float = 2.0,
@@ -46,7 +46,7 @@ def calibrate_auto(
     output
         The rig file to write.
     frame_rate
-        Frames per second of all videos.
+        Frames per second of all videos; by default what their heads agree on.
     person_height
         Mean body height, metres. It sets the scale where no distance is given.
     distance

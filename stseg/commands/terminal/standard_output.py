@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console
@@ -16,7 +18,18 @@ _WORDS = ("camera", "view", "zone", "line", "recognised", "classes", "")
 def output_console() -> Console:
     """Standard output as a console without markup."""
     console = Console(highlight=False, markup=False)
-    return console if console.is_terminal else Console(highlight=False, markup=False, width=_WHOLE)
+    whole = Console(file=_Trimmed(), highlight=False, markup=False, width=_WHOLE)  # type: ignore[arg-type]
+    return console if console.is_terminal else whole
+
+
+class _Trimmed:
+    """Standard output without blanks at the ends of lines: rich fills the lines of tables."""
+
+    def write(self, text: str) -> None:
+        sys.stdout.write(re.sub(" +$", "", text, flags=re.MULTILINE))
+
+    def flush(self) -> None:
+        sys.stdout.flush()
 
 
 def table_of(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> Table:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 
 from stseg.arrays import Floats, Rows
 from stseg.records.track_heights import median_measured
@@ -51,6 +52,11 @@ class Doubt:
     def frame(self) -> int:
         """The frame in which it is decided: the middle one."""
         return (self.first + self.last + 1) // 2
+
+    @property
+    def chance(self) -> float:
+        """Probability that it is wrong."""
+        return float(expit(-self.margin))
 
 
 def find_doubts(trajectory: Rows, frame_rate: float, border: Floats) -> list[Doubt]:

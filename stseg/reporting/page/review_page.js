@@ -28,7 +28,7 @@
   };
   const go = (next) => {
     at = Math.min(Math.max(next, 0), Math.max(questions.length - 1, 0));
-    moment = questions.length ? Math.floor(questions[at].film.clock.length / 2) : 0;
+    moment = questions.length ? Math.min(questions[at].film.start, questions[at].film.clock.length - 1) : 0;
     show();
   };
   const answer = (key) => {
@@ -42,8 +42,11 @@
 
   const draw = () => {
     const { clock, tracks } = questions[at].film, canvas = element("plan"), pen = canvas.getContext("2d");
-    const width = canvas.clientWidth || 560, scale = (width - 24) / (x1 - x0), ratio = window.devicePixelRatio || 1;
-    const height = scale * (y1 - y0) + 24, u = (x) => 12 + (x - x0) * scale, v = (y) => 12 + (y1 - y) * scale;
+    const tallest = Math.max(240, 0.6 * innerHeight - 40), ratio = window.devicePixelRatio || 1;
+    const scale = Math.min(((canvas.parentElement.clientWidth || 560) - 42) / (x1 - x0), tallest / (y1 - y0));
+    const width = scale * (x1 - x0) + 42, height = scale * (y1 - y0) + 36;
+    const u = (x) => 30 + (x - x0) * scale, v = (y) => 12 + (y1 - y) * scale;
+    canvas.style.width = element("time").style.width = `${width}px`;
     canvas.style.height = `${height}px`;
     [canvas.width, canvas.height] = [width * ratio, height * ratio];
     pen.scale(ratio, ratio);
@@ -53,8 +56,20 @@
       [pen.strokeStyle, pen.lineWidth] = [colour, wide];
       pen.stroke();
     };
-    for (let x = Math.ceil(x0); x <= x1; x++) line([[x, y0], [x, y1]], "#e4e6ea", 1);
-    for (let y = Math.ceil(y0); y <= y1; y++) line([[x0, y], [x1, y]], "#e4e6ea", 1);
+    const step = [1, 2, 5, 10, 20, 50, 100].find((one) => one * scale > 24) || 200;
+    pen.font = "12px system-ui, sans-serif";
+    pen.fillStyle = "#8a9099";
+    pen.textAlign = "center";
+    for (let x = Math.ceil(x0 / step) * step; x <= x1; x += step) {
+      line([[x, y0], [x, y1]], "#e4e6ea", 1);
+      pen.fillText(x, u(x), v(y0) + 17);
+    }
+    pen.textAlign = "right";
+    for (let y = Math.ceil(y0 / step) * step; y <= y1; y += step) {
+      line([[x0, y], [x1, y]], "#e4e6ea", 1);
+      pen.fillText(y, 24, v(y) + 4);
+    }
+    pen.textAlign = "left";
     const border = data.polygon || [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
     line([...border, border[0]], "#2a2e34", 1);
     pen.font = "bold 13px system-ui, sans-serif";

@@ -43,7 +43,7 @@ class Question:
 
 def review_page(title: str, run_name: str, grid: Grid, questions: Sequence[Question], shows_images: bool) -> str:
     """The page's text; `run_name` is the run file's."""
-    items = "\n".join(map(_item, questions))
+    items = "\n".join(map(_item, questions)) if shows_images else ""
     privacy = "This page shows images from the cameras: share it with care." if shows_images else "No camera image."
     corrected = f"{run_name.removesuffix('.h5')}.corrected.h5"
     command = f"stseg correct {quote(run_name)} answers.csv -o {quote(corrected)}"
@@ -62,8 +62,13 @@ def _item(question: Question) -> str:
     return f'<div class="item row" hidden>{pictures}</div>'
 
 
-def plan_film(trajectory: Rows, first: int, last: int, frame_rate: float, ids: Sequence[int]) -> dict[str, object]:
-    """Times and places of all tracks from one frame to another, for the script; those of `ids` in their colours."""
+def plan_film(
+    trajectory: Rows, first: int, last: int, start: int, frame_rate: float, ids: Sequence[int]
+) -> dict[str, object]:
+    """Times and places of all tracks from one frame to another, for the script; those of `ids` in their colours.
+
+    The slider begins at the frame `start`.
+    """
     frames = np.unique(np.linspace(first, last, min(last - first + 1, _FILM_FRAMES)).astype(int))
     rows = trajectory[np.isin(trajectory["frame"], frames)]
     tracks = []
@@ -72,7 +77,8 @@ def plan_film(trajectory: Rows, first: int, last: int, frame_rate: float, ids: S
         moment, place = np.searchsorted(frames, path["frame"]), np.round(np.stack([path["x"], path["y"]], -1), 2)
         colour = hex_colour(track_colour(identity)) if identity in ids else _OTHERS
         tracks.append({"id": identity, "colour": colour, "moment": moment.tolist(), "place": place.tolist()})
-    return {"clock": [clock_time(frame / frame_rate) for frame in frames.tolist()], "tracks": tracks}
+    clock = [clock_time(frame / frame_rate) for frame in frames.tolist()]
+    return {"clock": clock, "tracks": tracks, "start": int(np.searchsorted(frames, start))}
 
 
 def best_views(rig: Rig, ground: AnyArray) -> list[int]:
@@ -116,19 +122,21 @@ _STYLE = """
 main { max-width: none } .row { display: flex; flex-wrap: wrap; gap: 10px; margin: 10px 0 }
 .row[hidden] { display: none } .row figure { margin: 0 }
 .both { display: flex; flex-wrap: wrap; gap: 20px } .both > div { flex: 1 1 420px }
-#plan { width: min(100%, 480px); border: 1px solid var(--rule) }
+.both > div:empty, [hidden] { display: none !important }
+#slider { flex: 1 } #plan { border: 1px solid var(--rule); max-width: 100% }
 #time { display: flex; position: static; background: none; box-shadow: none; border: 0 }
-#time { max-width: 480px; padding: 6px 0 }
+#time { padding: 6px 0 }
 #choices button { margin-right: 12px } #choices .chosen { outline: 3px solid var(--accent) }
 #csv { width: 100%; height: 120px; font-family: monospace }
 """
 
 _BODY = """<main>
 <h1>{title}</h1>
-<p>The most doubtful decision first. A key answers and goes on; arrows move, Backspace takes an answer back.
+<p>The most doubtful decision first; what is more than 99 % certain is not asked.
+A key answers and goes on; arrows move, Backspace takes an answer back.
 The slider and the space bar play the plan of these seconds; what you cannot tell stays as it is. {privacy}</p>
-<p><b id="count"></b> <span id="choices"></span></p>
 <h2 id="question"></h2>
+<p><b id="count"></b> <span id="choices"></span></p>
 <div class="both"><div><canvas id="plan"></canvas>
 <p id="time"><input id="slider" type="range" min="0" value="0" aria-label="time"> <span id="clock"></span></p></div>
 <div>{items}</div></div>

@@ -122,7 +122,7 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, 
     position = camera.centre[:2]
     edge = np.clip(position, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
     place, distance = plan.pixel(edge), float(np.hypot(*(position - edge)))
-    tone, name = (QUIET, f"{camera.name}, {distance:.1f} m off") if distance else (INK, camera.name)
+    tone, name = (QUIET, f"{camera.name}, {distance:.1f} m beyond") if distance else (INK, camera.name)
     directions = _view_directions(camera)
     if directions is not None:
         sector = np.concatenate([place[None], place + 46 * directions])

@@ -74,7 +74,7 @@ def calibrate_auto(
     videos: Sequence[Path | str],
     output: Path | str,
     *,
-    frame_rate: float,
+    frame_rate: float | None = None,
     person_height: float = 1.7,
     distances: Sequence[Distance] = (),
     most_delay: float = 2.0,
@@ -94,7 +94,7 @@ def calibrate_auto(
     output
         The rig file to write.
     frame_rate
-        Frames per second of all videos.
+        Frames per second of all videos; None for what their heads agree on.
     person_height
         Mean body height, metres. It sets the scale where no distance is given.
     distances
@@ -121,6 +121,9 @@ def calibrate_auto(
     """
     output, paths, reporter = Path(output), [Path(video) for video in videos], reporter_of(progress)
     require_output(output, overwrite, Inputs(paths))  # before videos are opened, which may be none
+    if frame_rate is None:
+        frame_rate = _rate_of_heads(paths)
+        reporter.note(f"{frame_rate:g} frames per second by the heads of the videos (--frame-rate)")
     streams = _streams(paths, output, frame_rate, background, source_kind)
     require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
@@ -177,6 +180,15 @@ def frame_rate_notes(videos: Sequence[Path], frame_rate: float) -> list[str]:
         for path, rate in rates
         if rate is not None and abs(np.log(rate / frame_rate)) > _RATE_MARGIN
     ]
+
+
+def _rate_of_heads(videos: Sequence[Path]) -> float:
+    """Frames per second on which the heads of all videos agree."""
+    rates = {rate for path in videos if path.is_file() and (rate := read_frame_rate(path)) is not None}
+    if len(rates) != 1:
+        found = " and ".join(f"{rate:.6g}" for rate in sorted(rates)) or "nothing"
+        raise ConfigError("command line", "--frame-rate", f"{found} by the heads of the videos", "it to be given")
+    return rates.pop()
 
 
 def uncalibrated_camera(name: str, video: Path) -> Camera:
