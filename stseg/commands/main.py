@@ -47,6 +47,7 @@ _FILES = ("-o", "--output", "--video")
 """Options that name a file to write, but for these commands."""
 _WRITERS_OF_FOLDERS = ("detect", "inspect", "labels", "measure")
 _FLAGS = ("--help", "-h", "--version")
+_GOING_ON = "; the same command goes on after the last finished segment, and begins anew where there is none"
 _USER_ERROR = 2
 _ADDRESS_SPACE = 2 * 2**30
 """Least address space in which the libraries of all commands work, bytes: with less, they crash as they are loaded."""
@@ -91,7 +92,7 @@ def _run(tokens: list[str]) -> int:
     if address_space() < _ADDRESS_SPACE:
         found, least = (f"{size // 2**20} MiB" for size in (address_space(), _ADDRESS_SPACE))
         return _fail(f"limit of address space (ulimit -v): found {found}, expected {least} or more")
-    termination = Termination()
+    termination = Termination(_GOING_ON if tokens[:1] == ["run"] else "")
     try:
         _require_command(tokens)
         _require_file_names(tokens)

@@ -28,8 +28,9 @@ def measure(
 
     **zones**: mean and most people, entries, exits, dwell times, density of each zone; **people**: each zone in each
     frame, with mean and standard deviation of its count by scores and places; **visits**: each stay; **lines** and
-    **crossings**: each direction (left and right as seen along the line); **tracks**: distance and speeds; **spacing**:
-    distances between people; **field**: density, speed and flow on a grid, drawn in flow.png.
+    **crossings**: each direction (left and right as seen along the line); **tracks**: distance and speeds;
+    **motion**: speed, heading and acceleration with their uncertainty; **spacing**: distances between people;
+    **field**: density, speed and flow on a grid, drawn in flow.png.
 
     The same from Python: stseg.measure(stseg.read_run("night.h5"), "zones.geojson", "lines.geojson").
 

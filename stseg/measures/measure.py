@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import Ints, Rows
 from stseg.geometry import Grid
 from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, standard_error, zone_counts, zone_visits
-from stseg.measures.motion import flow_field, spacings, track_measures
+from stseg.measures.motion import flow_field, motions, spacings, track_measures
 
 ZONE = np.dtype(
     [("zone", "O"), ("area", "<f8"), ("mean_people", "<f8"), ("deviation", "<f8"), ("most_people", "<i8"),
@@ -32,6 +32,7 @@ class Measures:
     lines: Rows
     crossings: Rows
     tracks: Rows
+    motion: Rows
     spacing: Rows
     field: Rows
 
@@ -92,6 +93,7 @@ def measure_tracks(
         np.array(lines, LINE),
         np.concatenate([np.zeros(0, CROSSING), *crossings]),
         track_measures(trajectory, frame_rate),
+        motions(trajectory, frame_rate),
         spacings(trajectory, frame_rate),
         flow_field(trajectory, frames, frame_rate, grid.x, grid.y, side),
     )

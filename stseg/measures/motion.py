@@ -1,6 +1,9 @@
-"""Speeds of tracks, distances between people, and fields of density and flow."""
+"""Speeds of tracks with their uncertainty, distances between people, and fields of density and flow."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,7 +22,53 @@ CELL = np.dtype(
 )
 """One row per bin of the ground: centre, metres; people a square metre; mean speed, m/s; flow, people a metre and
 second."""
+MOTION = np.dtype(
+    [("frame", "<i8"), ("id", "<i8"), ("speed", "<f8"), ("speed_deviation", "<f8"), ("heading", "<f8"),
+     ("heading_deviation", "<f8"), ("acceleration", "<f8"), ("acceleration_deviation", "<f8")]
+)  # fmt: skip
+"""One row per person and frame, with standard deviations: metres a second; radians from x towards y; metres a second
+squared along the heading. nan where a track has fewer than three rows nearby."""
 _STANDING = 0.2
+_ERRORS_LAST = 0.5
+"""Time in which the correlation of errors of places falls by e, seconds: of stated deviations of velocity, 62 to 82 %
+then hold the truth's in three recordings, of acceleration 65 to 90 % (asked: 68)."""
+_ANY_HEADING = np.pi / 3**0.5
+"""Standard deviation of a heading of which nothing is known, radians."""
+
+
+def motions(trajectory: Rows, frame_rate: float) -> Rows:
+    """Speed, heading and acceleration of every row, MOTION (n,), by a parabola through the second around it."""
+    rows: list[tuple[float, ...]] = []
+    for track in by_track(trajectory):
+        frame, half = track["frame"], max(1, round(frame_rate / 2))
+        first, stop = np.searchsorted(frame, frame - half), np.searchsorted(frame, frame + half, "right")
+        for k, (begin, end) in enumerate(zip(first.tolist(), stop.tolist(), strict=True)):
+            piece = track[begin:end]
+            rows.append((frame[k], track["id"][k], *_motion(piece, piece["frame"] - frame[k], frame_rate)))
+    return np.array(rows, MOTION)
+
+
+def _motion(piece: Rows, offset: Ints, frame_rate: float) -> Sequence[float]:
+    """Columns of MOTION from `speed` on, by rows at frames `offset` from the one in question."""
+    if len(piece) < 3:
+        return (np.nan,) * 6
+    weights, growth = _parabola(tuple(offset.tolist()), frame_rate)
+    velocity, acceleration = weights @ _ground(piece)
+    xx, xy, yy = (float(piece[name].mean()) for name in ("xx", "xy", "yy"))
+    speed, heading = float(np.hypot(*velocity)), float(np.arctan2(velocity[1], velocity[0]))
+    ahead, across = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
+    spread, side = (max(float(one @ [[xx, xy], [xy, yy]] @ one), 0.0) ** 0.5 for one in (ahead, across))
+    turning = min(side * growth[0] / max(speed, 1e-9), _ANY_HEADING)
+    return speed, spread * growth[0], heading, turning, float(acceleration @ ahead), spread * growth[1]
+
+
+@lru_cache(1024)
+def _parabola(offset: tuple[int, ...], frame_rate: float) -> tuple[Floats, Sequence[float]]:
+    """Weights (2, n) of places in velocity and acceleration at 0, and their deviations for places that err by 1."""
+    seconds = np.array(offset) / frame_rate
+    weights = np.linalg.pinv(np.stack([np.ones(len(seconds)), seconds, seconds**2 / 2], -1))[1:]
+    alike = np.exp(-np.abs(seconds[:, None] - seconds) / _ERRORS_LAST)
+    return weights, np.sqrt(np.diag(weights @ alike @ weights.T)).tolist()
 
 
 def track_measures(trajectory: Rows, frame_rate: float) -> Rows:

@@ -49,7 +49,7 @@ def measure(
     Returns
     -------
     Measures
-        Structured arrays: zones, people, visits, lines, crossings, tracks, spacing, field.
+        Structured arrays: zones, people, visits, lines, crossings, tracks, motion, spacing, field.
 
     Raises
     ------

@@ -9,6 +9,7 @@ import pytest
 from cases import cases
 from refusals import refused
 from run_files import table_of, trajectory_of, write_small_run
+from scipy.signal import lfilter
 
 import stseg
 from stseg.arrays import Floats, Rows
@@ -17,6 +18,7 @@ from stseg.errors import FormatError
 from stseg.geometry import Grid
 from stseg.io.areas import read_lines, read_polygons
 from stseg.measures import Areas, Line, Zone, measure_tracks
+from stseg.measures.motion import motions
 from stseg.records.tables import TRAJECTORY
 
 GRID = Grid((-5.0, 5.0), (-2.0, 2.0), 0.1)
@@ -24,7 +26,7 @@ SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 UP = Line("up", np.array([[0.0, -2.0], [0.0, 2.0]]))
 
 
-def walk(identity: int, x: Floats, y: float = 0.0, score: float = 9.0) -> Rows:
+def walk(identity: int, x: Floats, y: float | Floats = 0.0, score: float = 9.0) -> Rows:
     return table_of(TRAJECTORY, frame=np.arange(len(x)), id=identity, x=x, y=y, score=score)
 
 
@@ -39,9 +41,21 @@ def test_one_who_walks_through() -> None:
     assert (line["left"], line["right"]) == (0, 1)
     assert found.crossings["time"][0] == pytest.approx(4.0) and found.crossings["speed"][0] == pytest.approx(1.0)
     assert track["distance"] == pytest.approx(8.0) and track["mean_speed"] == pytest.approx(1.0)
-    assert not len(found.spacing)
+    assert not len(found.spacing) and found.motion[40].tolist() == pytest.approx((40, 1, 1, 0, 0, 0, 0, 0), abs=1e-9)
     row = found.field[(found.field["x"] == 0.25) & (found.field["y"] == 0.25)][0]
     assert row["flow_x"] == pytest.approx(row["density"] * 1.0, rel=1e-6) and abs(row["flow_y"]) < 1e-9
+
+
+def test_motion_has_the_uncertainty_of_places() -> None:
+    """A circle of 2 m at 1 m/s, by places that err by 0.1 m, alike for half a second."""
+    lots, angle, alike = np.random.default_rng(3), np.arange(6000) / 20, np.exp(-0.2)
+    errors = lfilter([0.1 * (1 - alike**2) ** 0.5], [1, -alike], lots.normal(size=(2, 6000)))
+    rows = walk(1, 2 * np.cos(angle) + errors[0], 2 * np.sin(angle) + errors[1])
+    rows["xx"] = rows["yy"] = 0.01
+    found = motions(rows, 10.0)[10:-10]
+    turned = np.angle(np.exp(1j * (found["heading"] - angle[10:-10] - np.pi / 2)))
+    for off, deviation in ((found["speed"] - 1, "speed"), (turned, "heading"), (found["acceleration"], "acceleration")):
+        assert 0.55 < (np.abs(off) < found[f"{deviation}_deviation"]).mean() < 0.75
 
 
 def test_standing_on_a_line_is_no_traffic() -> None:
@@ -89,9 +103,6 @@ def test_short_absences_do_not_end_a_visit_and_holes_are_outside() -> None:
     assert (visit["first"], visit["last"], bool(visit["entered"]), bool(visit["left"])) == (0, 44, False, True)
     assert zone.area == pytest.approx(3.96)
     assert zone.contains(np.array([[0.5, 0.5], [0.0, 0.0]])).tolist() == [False, True]
-
-
-def test_nothing_is_measured_of_nobody() -> None:
     found = measure_tracks(trajectory_of(), np.arange(5), 10.0, GRID, Areas((Zone("z", (SQUARE,)),), (UP,)))
     assert found.people["people"].tolist() == [0] * 5 and not len(found.tracks) and found.field["density"].sum() == 0
 

@@ -28,10 +28,11 @@ class Termination:
     Python runs no handler while a kernel is at work or compiled in the main thread, and an orderly end may be slow. So
     a thread learns of every signal as well, and ends the process where the command has not ended in time. Files are
     written so that an end at any moment loses nothing. The first signal to a run that goes on (`run --follow`) only
-    asks it to finish.
+    asks it to finish. `advice` follows the word that says how the command ended.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, advice: str = "") -> None:
+        self._advice = advice
         self._number: int | None = None
         self._watch: _Watch | None = None
         self._before: dict[int, Any] = {}
@@ -40,7 +41,7 @@ class Termination:
             self._before[signal.SIGTERM] = signal.signal(signal.SIGTERM, self._interrupt)
             if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
                 self._before[signal.SIGINT] = signal.signal(signal.SIGINT, self._interrupt)
-            self._watch = _Watch()
+            self._watch = _Watch(advice)
             sys.unraisablehook = self._repeat_interrupt
 
     @property
@@ -51,7 +52,7 @@ class Termination:
     @property
     def line(self) -> str:
         """Message for standard error."""
-        return f"stseg: {'terminated' if self._number == signal.SIGTERM else 'interrupted'}"
+        return f"stseg: {'terminated' if self._number == signal.SIGTERM else 'interrupted'}{self._advice}"
 
     @property
     def status(self) -> int:
@@ -84,7 +85,8 @@ class Termination:
 class _Watch:
     """A thread that waits for signals, and for the end of the command after one."""
 
-    def __init__(self) -> None:
+    def __init__(self, advice: str) -> None:
+        self._advice = advice
         self._ended = threading.Event()
         self._reader, self._writer = os.pipe()
         if hasattr(os, "set_blocking"):  # not in Python 3.11 on Windows
@@ -111,10 +113,10 @@ class _Watch:
                     left_to = going_on
                     going_on.ask()
                 elif not self._ended.wait(_PATIENCE):
-                    _end(number)
+                    _end(number, self._advice)
 
 
-def _end(number: int) -> None:
+def _end(number: int, advice: str) -> None:
     """End this process and those that it has started, at once."""
     if "multiprocessing" in sys.modules:
         for child in sys.modules["multiprocessing"].active_children():
@@ -123,5 +125,5 @@ def _end(number: int) -> None:
     with suppress(OSError, ValueError):
         error = sys.stderr.fileno()  # not the stream, in which a lock may be held
         cursor = "\x1b[?25h" if os.isatty(error) else ""  # a progress bar has hidden it
-        os.write(error, f"{cursor}stseg: {word}\n".encode())
+        os.write(error, f"{cursor}stseg: {word}{advice}\n".encode())
     os._exit(status)

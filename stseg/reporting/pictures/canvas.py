@@ -96,18 +96,9 @@ def text(
     anchor: tuple[float, float] = (0.0, 1.0),
     weight: int = 1,
 ) -> None:
-    """A line of text.
+    """A line of text with its anchor at `place`; (0, 0) is its upper left corner, (1, 1) the lower right one.
 
-    Parameters
-    ----------
-    place
-        Position of the anchor, pixels.
-    size
-        Height of capitals, pixels.
-    anchor
-        Reference point within the text: (0, 0) is its upper left corner, (1, 1) the lower right one.
-    weight
-        1 plain, 2 bold.
+    `size` is the height of capitals, pixels; `weight` is 1 for plain and 2 for bold text.
     """
     width, height = text_size(words, size, weight)
     u, v = round(place[0] - anchor[0] * width), round(place[1] + (1 - anchor[1]) * height)

@@ -201,14 +201,8 @@ def flow_map(
 ) -> Picture:
     """Density from above, with an arrow of the mean velocity in each busy bin.
 
-    Parameters
-    ----------
-    field : CELL (bins,)
-        Of `stseg.measures.motion.flow_field`.
-    zones
-        Name and rings of each, metres.
-    lines
-        Name and points of each, metres.
+    `field` CELL (bins,) is of `stseg.measures.motion.flow_field`; zones are names and rings, lines names and points,
+    metres.
     """
     x = np.unique(field["x"])
     side = float(np.diff(x).min()) if len(x) > 1 else rig.grid.x[1] - rig.grid.x[0]

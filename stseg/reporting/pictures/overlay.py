@@ -176,14 +176,7 @@ def _ground_lines(
 def grid_picture(camera: Camera, grid: Grid, image: Bytes | None, frame: int, width: int = 1280) -> Picture:
     """The ground's metres, and poles as tall as most people with a mark at each half metre, over a camera's frame.
 
-    Parameters
-    ----------
-    image : uint8 (v, u, 3) or (v, u) or None
-        As in `overlay`.
-    frame
-        Its number.
-    width
-        Of the picture, pixels.
+    `image` is as in `overlay`, `frame` its number, `width` that of the picture, pixels.
     """
     view = OverlayView(camera, width)
     canvas = view.canvas(image)

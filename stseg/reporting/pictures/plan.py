@@ -34,16 +34,12 @@ def plan_view(
 
     Parameters
     ----------
-    rig
-        Its rectangle, polygon and cameras.
     trajectory : TRAJECTORY (n,)
         Coloured lines: a dot where a track starts, an arrow head and its id where it ends, dashes where it has gaps.
     truth : (m,) with frame, id, x, y
         Thin dark dashed lines; None for none.
     coverage : uint8 (y, x)
         Number of views that see each ground cell: the more, the lighter. None for plain paper.
-    title
-        Stands above.
     width, height
         The largest size of the picture, pixels.
     names

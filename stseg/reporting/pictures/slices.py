@@ -27,20 +27,9 @@ def volume_picture(
 ) -> Picture:
     """All planes of one frame as a contact sheet, the ground first, y up.
 
-    Parameters
-    ----------
-    log_odds : float (plane, y, x)
-        Nats; nan where no view sees the cell.
-    label : int32 (plane, y, x)
-        Track ids, outlined in the tracks' colours; 0 is background.
-    grid
-        Heights of the planes and the shape of the ground.
-    title
-        Stands above.
-    width
-        About how wide the picture is, pixels.
-    limit
-        Log-odds at which colours end, nats; None for the 99th percentile of their sizes.
+    `log_odds` float (plane, y, x) are nats, nan where no view sees the cell; the ids of `label` int32 (plane, y, x) are
+    outlined, 0 is background. `width` is about that of the picture, pixels. Colours end at log-odds of `limit`, nats,
+    or at the 99th percentile of their sizes.
     """
     panels = [_Panel(f"{z:.2f} m", log_odds[k], label[k]) for k, z in enumerate(grid.heights)]
     return _contact_sheet(panels, title, width, colour_limit(log_odds) if limit is None else limit)

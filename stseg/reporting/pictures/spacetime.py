@@ -22,17 +22,8 @@ def spacetime_picture(
 ) -> Picture:
     """Draw tracks as threads that rise with time; near ones pass in front of far ones.
 
-    Parameters
-    ----------
-    grid
-        The ground rectangle at the bottom.
-    trajectory : TRAJECTORY (n,)
-    frame_rate
-        Frames per second; the upright axis is labelled in seconds.
-    title
-        Stands above.
-    width, height
-        Size of the picture, pixels.
+    The ground rectangle is at the bottom, TRAJECTORY (n,) above, the title on top; the upright axis is labelled in
+    seconds, by the frames per second. The size is in pixels.
     """
     canvas = blank(width, height, PAPER)
     text(canvas, title, (40, 30), INK, 20, (0, 0), 2)
