@@ -101,7 +101,8 @@ def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys:
         drawn = page.picture(1280, 900)
         page.ask("dispatchEvent(new KeyboardEvent('keydown', { key: ' ' })), 0")
         page.wait_for("document.getElementById('slider').value === document.getElementById('slider').max")
-        assert page.picture(1280, 900) != drawn
+        assert page.picture(1280, 900) != drawn and page.picture(400, 900)
+        assert page.ask("document.documentElement.scrollWidth <= 400"), "narrow screens need no scrolling sideways"
         asked = page.ask("document.getElementById('question').textContent")
         assert "Are 1 and 2 after the encounter" in asked and "wrong with a probability of" in asked
         page.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '2' })), 0")

@@ -102,7 +102,7 @@ point, <b>arrows</b> move by a quarter pixel (with shift, one), <b>[ ]</b> choos
 <b>Ctrl+Z</b> undoes, the wheel zooms. This page shows frames of the cameras and loads nothing.</p></details>
 <p class="tools">point <b id="which"></b> x <input id="x" type="number" step="any" aria-label="x, metres">
 y <input id="y" type="number" step="any" aria-label="y, metres"> z <input id="z" type="number" step="any" min="0"
-aria-label="z, metres"> m <button id="new">New point (N)</button> <button id="raise">Pole (P), m</button><input
+aria-label="z, metres"> m <button id="new">Next (N)</button> <button id="raise">Pole (P), m</button><input
 id="pole" type="number" value="2" step="any" aria-label="pole"> <button id="undo">Undo</button>
 <label>snap <select id="snap"><option value="0">off</option><option>0.05</option><option>0.1</option>
 <option>0.5</option><option>1</option></select> m</label>
