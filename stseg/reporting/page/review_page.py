@@ -121,7 +121,8 @@ def _crop(picture: Bytes, camera: Camera, rows: Rows) -> Bytes:
 _STYLE = """
 main { max-width: none } .row { display: flex; flex-wrap: wrap; gap: 10px; margin: 10px 0 }
 .row[hidden] { display: none } .row figure { margin: 0 }
-.both { display: flex; flex-wrap: wrap; gap: 20px } .both > div { flex: 1 1 min(420px, 100%); min-width: 0 } .row img { max-width: 100% }
+.both { display: flex; flex-wrap: wrap; gap: 20px } .both > div { flex: 1 1 min(420px, 100%); min-width: 0 }
+.row img { max-width: 100% }
 .both > div:empty, [hidden] { display: none !important }
 #slider { flex: 1 } #plan { border: 1px solid var(--rule); max-width: 100% }
 #time { display: flex; position: static; background: none; box-shadow: none; border: 0 }
