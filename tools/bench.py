@@ -39,18 +39,8 @@ RUN = "import sys; from stseg.commands.main import main; sys.exit(main())"
 
 @dataclass(frozen=True)
 class Workload:
-    """A recording, and the frames of it that are measured.
-
-    Attributes
-    ----------
-    name
-    scene
-        What is simulated.
-    rig
-        The rig file: video, masks or boxes.
-    few, many
-        Frames of the two runs whose difference is the cost; without `many` the cost is that of the first.
-    """
+    """What is simulated, the rig file of its video, masks or boxes, and the frames of two runs whose difference is the
+    cost; without `many` the cost is that of the first."""
 
     name: str
     scene: SceneSpec
@@ -121,12 +111,8 @@ def stored_commit(name: str) -> str:
 
 def record(rows: Sequence[tuple[str, float]]) -> None:
     """Append names and milliseconds of workloads to the table, under this commit."""
-    new = not TABLE.exists()
     with TABLE.open("a", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        if new:
-            writer.writerow(["commit", "workload", "milliseconds"])
-        writer.writerows([commit(), name, f"{taken:.1f}"] for name, taken in rows)
+        csv.writer(file, lineterminator="\n").writerows([commit(), name, f"{taken:.1f}"] for name, taken in rows)
 
 
 def main() -> None:

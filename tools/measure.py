@@ -104,10 +104,8 @@ def scored(one: ResultSet, bench: Bench, run: Tracked) -> Scores:
     """Scores of the final tracks of a perturbed run."""
     assert one.truth is not None
     rows = run.pipeline.finished(*run.rows)[0].trajectory
-    area, frames = (
-        scored_area(one, read_recording(bench.path(one.rig)).rig),
-        np.arange(*map(int, one.frames.split(":"))),
-    )
+    area = scored_area(one, read_recording(bench.path(one.rig)).rig)
+    frames = np.arange(*map(int, one.frames.split(":")))
     flagged = "--ignore-flagged" in shlex.split(one.scoring)
     return evaluate(read_tracks_csv(bench.path(one.truth)), rows, area=area, frames=frames, ignore_flagged=flagged)
 

@@ -83,9 +83,7 @@ def checks(tree: ast.Module) -> Iterator[Check]:
                 for part in ast.walk(node):
                     if isinstance(part, ast.BoolOp) and isinstance(part.op, ast.And):
                         for k, one in enumerate(part.values):
-                            yield Check(
-                                one.lineno, "question", part.values, k, ast.Constant(True), "value(K, X, False)"
-                            )
+                            yield Check(one.lineno, "question", part.values, k, ast.Constant(True), "value(K, X, 0)")
             case ast.BinOp(op=ast.BitOr(), right=right) if _name(right) in FLAGS:
                 yield Check(node.lineno, "flag", node, "right", ast.Constant(0), "value(K, X, 1)")
             case ast.Call(func=called, args=[_]) if _name(called) in ESCAPES:

@@ -50,25 +50,15 @@ class ResultSet:
 
     Attributes
     ----------
-    name
-    foreground
-        What the run starts from.
-    views
-        Number of cameras.
+    name, views
+    foreground, area, remark
+        What the run starts from, what is scored, and what else there is to say: in words.
     frames
         A:B, half open: what is run and scored.
-    rig
-        The rig file.
-    prepare
-        Commands that make it, and what else is needed.
-    film
-        The command that renders a simulated scene; run only where `rig` is not there yet.
-    truth
-        CSV file, or None where there is none.
-    scoring
-        Options of `stseg evaluate` beside the frames.
-    area, remark
-        In words.
+    rig, prepare, film
+        The rig file, commands that make it, and the one that renders a simulated scene where `rig` is not there yet.
+    truth, scoring
+        CSV file, or None where there is none; options of `stseg evaluate` beside the frames.
     colour
         Whether it is followed in the variants, too, that need colour images.
     """

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.optimize import approx_fprime
 
 from stseg.arrays import Floats, Ints
 from stseg.calibration.automatic.solution import SolvedViews
@@ -15,6 +17,7 @@ from stseg.geometry import Camera, Grid
 
 _MARGIN = 0.5
 """Margin of the grid around the adjusted ground points, metres."""
+_STEP_SIZE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,19 +57,23 @@ def centred(solution: SolvedViews) -> SolvedViews:
 
 
 def _moved(solution: SolvedViews, turn: float, middle: Floats, scale: float) -> SolvedViews:
-    """The solution turned about a middle, which becomes the origin, and scaled; the covariance is not turned."""
+    """The solution turned about a middle, which becomes the origin, and scaled."""
     adjustment, matched = solution.adjustment, solution.problem.correspondences
     about = scale * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     places = adjustment.parameters.points
     points = np.column_stack([(places[:, :2] - middle) @ about.T, scale * places[:, 2]])
-    views = np.array([moved(view, turn, -about @ middle, scale) for view in adjustment.parameters.views])
-    stretch = np.ones(len(adjustment.covariance))
-    stretch[:-2].reshape(-1, SIZE)[:, CENTRE] = stretch[-2:] = scale
+    old = adjustment.parameters.views
+
+    def after(view: Floats) -> Floats:
+        return moved(view, turn, -about @ middle, scale)
+
+    views = np.array([after(view) for view in old])
+    slope = block_diag(*(approx_fprime(view, after, _STEP_SIZE) for view in old), scale * np.eye(2))
     ground = replace(matched, ground=(matched.ground - middle) @ about.T, velocity=matched.velocity @ about.T)
     adjustment = replace(
         adjustment,
         parameters=BundleParameters(views, scale * adjustment.parameters.toe_offset, points),
-        covariance=stretch[:, None] * adjustment.covariance * stretch,
+        covariance=slope @ adjustment.covariance @ slope.T,
     )
     problem = replace(solution.problem, correspondences=ground, height=scale * solution.problem.height)
     return replace(solution, adjustment=adjustment, problem=problem)

@@ -13,12 +13,12 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.calibration.automatic.correspondence import Correspondences
-from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, MIDDLE, RADIAL, SIZE, moved, project
+from stseg.calibration.pinhole import CENTRE, CLOCK, ENDS, FOCAL, MIDDLE, RADIAL, SIZE, moved, project
 
-_STEP_SIZES = np.array([1e-5] * 5 + [1e-5] * 3 + [1e-4] * 3 + [1e-3])
+_STEP_SIZES = np.array([1e-5] * 5 + [1e-5] * 3 + [1e-4] * 3 + [1e-3] + [1e-4] * 2)
 """Steps of the finite differences of a camera's parameters."""
 _PRIOR_SPREAD = np.zeros(SIZE)
-_PRIOR_SPREAD[FOCAL], _PRIOR_SPREAD[MIDDLE], _PRIOR_SPREAD[RADIAL] = 0.5, 0.01, 0.25
+_PRIOR_SPREAD[FOCAL], _PRIOR_SPREAD[MIDDLE], _PRIOR_SPREAD[RADIAL], _PRIOR_SPREAD[ENDS] = 0.5, 0.01, 0.25, 0.0025
 _PRIOR_MEAN = np.zeros(SIZE)
 _PRIOR_MEAN[FOCAL], _PRIOR_MEAN[3] = np.log(0.85), -0.15
 _LENS_SPREAD = {FOCAL: 0.05, 3: 0.05, 4: 0.05}
@@ -38,7 +38,7 @@ class BundleParameters:
     """Parameters of the adjustment."""
 
     views: Floats
-    """float64 (view, 12): see `stseg.calibration.pinhole`."""
+    """float64 (view, 14): see `stseg.calibration.pinhole`."""
     toe_offset: Floats
     """float64 (2,): distance from a body's axis to its lowest visible point, towards the camera: metres at rest or
     walking across, and metres for each m/s along the viewing ray (half a step)."""
@@ -82,7 +82,7 @@ class Adjustment:
 
     parameters: BundleParameters
     covariance: Floats
-    """float64 (12 view + 2, 12 view + 2): of the cameras and `toe_offset`, marginal over the points; the gauge (turn,
+    """float64 (14 view + 2, 14 view + 2): of the cameras and `toe_offset`, marginal over the points; the gauge (turn,
     shift and time) is spread evenly."""
     residual: Floats
     """float64 (m, 2, 2): foot and head of each observation, observed minus predicted, along and across the body, in
@@ -153,6 +153,9 @@ def _residuals(views: Floats, toe_offset: Floats, points: Floats, problem: Bundl
     square = (down**2).sum(axis=1)[:, None]
     foot = correspondences.foot - project(views, width, height, lowest)
     head = correspondences.head - project(views, width, height, place)
+    excess = (problem.body * width / np.sqrt(square[:, 0]))[:, None] * views[:, ENDS]
+    foot -= excess[:, :1] * down
+    head += excess[:, 1:] * down
     across = np.stack([-down[:, 1], down[:, 0]], -1)
     return np.asarray(
         np.stack([[(end * way).sum(axis=1) for way in (down, across)] for end in (foot, head)]).transpose(2, 0, 1)
@@ -196,7 +199,7 @@ def same_make(views: Floats, size: Ints) -> Floats:
 
     Parameters
     ----------
-    views : float64 (view, 12)
+    views : float64 (view, 14)
         Approximate cameras.
     size : int64 (view, 2)
         Width and height of their images, pixels.

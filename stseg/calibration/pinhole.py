@@ -12,10 +12,12 @@ from stseg.arrays import Floats
 from stseg.geometry import Camera, Lens
 from stseg.geometry.fits import middle_matrix
 
-FOCAL, MIDDLE, RADIAL, TURN, CENTRE, CLOCK = 0, slice(1, 3), slice(3, 5), slice(5, 8), slice(8, 11), 11
+FOCAL, MIDDLE, RADIAL, TURN, CENTRE = 0, slice(1, 3), slice(3, 5), slice(5, 8), slice(8, 11)
+CLOCK, ENDS = 11, slice(12, 14)
 """Slices of the vector: log of focal length over image width; principal point from the image's middle, in widths;
-k1, k2; rotation vector from world to camera; centre, metres; delay of the stream, seconds."""
-SIZE = 12
+k1, k2; rotation vector from world to camera; centre, metres; delay of the stream, seconds; how far the view's
+silhouettes reach below feet and above heads, in widths."""
+SIZE = 14
 
 
 def project(views: Floats, width: Floats, height: Floats, points: Floats) -> Floats:
@@ -23,7 +25,7 @@ def project(views: Floats, width: Floats, height: Floats, points: Floats) -> Flo
 
     Parameters
     ----------
-    views : float64 (n, 12)
+    views : float64 (n, 14)
         Cameras.
     width, height : float64 (n,)
         Of their images, pixels.

@@ -31,8 +31,8 @@ from stseg.calibration.automatic.solution import (
     view_places,
 )
 from stseg.calibration.automatic.view_alignment import ViewPlaces, align, mirrored
-from stseg.calibration.bundle_adjustment import residuals
-from stseg.calibration.pinhole import CENTRE, SIZE, as_camera, height_of_head, looking, moved, on_plane, project
+from stseg.calibration.bundle_adjustment import adjust, residuals
+from stseg.calibration.pinhole import CENTRE, ENDS, SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera, Grid
@@ -193,8 +193,7 @@ def test_the_whole_way_finds_cameras_clocks_and_scale(scene: Walking, solution: 
 
 def test_focal_lengths_are_as_near_as_they_say(scene: Walking, solution: SolvedViews) -> None:
     for camera, report in zip(scene.rig.cameras, reports_of(solution, 0.0), strict=True):
-        assert camera.lens is not None
-        assert abs(report.focal - camera.lens.matrix[0, 0]) < 4 * report.focal_spread + 1
+        assert camera.lens is not None and abs(report.focal - camera.lens.matrix[0, 0]) < 4 * report.focal_spread + 1
         assert 0 < report.centre_spread < 0.5 and report.foot_pixels < 4 and report.observations > 100
 
 
@@ -213,9 +212,8 @@ def test_a_bare_floor_changes_nothing(scene: Walking, solution: SolvedViews) -> 
 def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: SolvedViews) -> None:
     turned = scaled(centred(solution), 1.3)
     for one in (solution, turned):
-        np.testing.assert_allclose(
-            residuals(one.adjustment.parameters, one.problem), solution.adjustment.residual, atol=2e-3
-        )
+        missed = residuals(one.adjustment.parameters, one.problem)
+        np.testing.assert_allclose(missed, solution.adjustment.residual, atol=2e-3)
 
 
 @pytest.mark.slow
@@ -237,6 +235,18 @@ def test_uncertainties_of_lengths_contain_that_of_the_scale(solution: SolvedView
     spread = [reports_of(one, 0.1)[0].centre_spread for one in (solution, scaled(solution, 2.0))]
     away = np.linalg.norm(solution.adjustment.parameters.views[0, 8:11])
     assert spread[0] > 0.1 * away and spread[1] == pytest.approx(2 * spread[0])
+    again = replace(solution, adjustment=adjust(solution.adjustment.parameters, solution.problem))
+    assert scale_spread(again, []) == pytest.approx(scale_spread(solution, []), rel=0.02), "the covariance turns, too"
+
+
+def test_silhouettes_that_reach_beyond_bodies_are_found(scene: Walking) -> None:
+    beyond, views = np.array([3.0, -3.0, 0.0]), []
+    for one, pixels in zip(scene.views.endpoints, beyond, strict=True):
+        way = pixels * (one.foot - one.head) / one.length[:, None]
+        views.append(replace(one, foot=one.foot + way, head=one.head - way))
+    found = auto.calibrate_from_people(NAMES, replace(scene.views, endpoints=tuple(views)), lambda: None)
+    ends = IMAGE[0] * found.adjustment.parameters.views[:, ENDS].T
+    np.testing.assert_allclose(ends - ends.mean(axis=1, keepdims=True), [beyond] * 2, atol=1.0)
 
 
 @pytest.mark.parametrize("count", [3, *in_ci(1)])
@@ -253,12 +263,9 @@ def judge(places: list[ViewPlaces]) -> None:
     auto.require_merged(NAMES, places, auto.merge_views(places, auto.align_all(places, 5.0, 10, lambda: None)), 5.0, 10)
 
 
-def test_views_of_the_same_people_are_let_pass(scene: Walking) -> None:
-    judge(true_walks(scene))
-
-
 def test_another_time_and_a_mirrored_view_are_named(scene: Walking) -> None:
     a, b, c = true_walks(scene)
+    judge([a, b, c])
     refused(SourceError, r"^c: .* at the same time", judge, [a, b, replace(c, frame=c.frame + 500)])
     refused(SourceError, r"^b: .* mirror", judge, [a, mirrored(b), c])
 
@@ -348,17 +355,8 @@ def marks(cameras: tuple[Camera, ...]) -> Marks:
 def test_marks_are_the_same_place_in_both_views(cameras: tuple[Camera, ...], marks: Marks) -> None:
     places = [camera.back_project(marks.pixel[:, side]) for side, camera in enumerate(cameras)]
     away = np.linalg.norm(places[0] - places[1], axis=1)
-    assert len(marks) >= 30
-    assert np.median(away) < 0.05 and np.percentile(away, 90) < 0.12
-
-
-def test_marks_lie_where_they_are_said_to(cameras: tuple[Camera, ...], marks: Marks) -> None:
-    assert np.median(np.linalg.norm(cameras[0].back_project(marks.pixel[:, 0]) - marks.ground, axis=1)) < 0.1
-
-
-def test_a_bare_floor_has_no_marks(cameras: tuple[Camera, ...]) -> None:
-    bare = [np.full((camera.size[1], camera.size[0], 3), 120, np.uint8) for camera in cameras]
-    assert len(floor_marks(bare, cameras, GRID)) == 0
+    assert len(marks) >= 30 and np.median(away) < 0.05 and np.percentile(away, 90) < 0.12
+    assert np.median(np.linalg.norm(places[0] - marks.ground, axis=1)) < 0.1
 
 
 @pytest.mark.slow

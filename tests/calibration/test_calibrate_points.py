@@ -150,9 +150,11 @@ class TestSpread:
         assert "cam: its points are badly spread" in words and "add points there" in words
         assert fit_warnings(fit(points_of(true), true), GRID) == []
 
-    def test_four_points_show_nothing(self) -> None:
-        words = fit_warnings(fit(points_of(camera(), SPREAD[:4]), camera()), GRID)
-        assert any("a fifth" in word for word in words)
+    @pytest.mark.parametrize(("times", "message"), [(0.5, "another size?"), (1.0, "a fifth"), (2.0, "another size?")])
+    def test_four_points_and_pixels_of_another_image_are_named(self, times: float, message: str) -> None:
+        seen = points_of(camera(), SPREAD[:4])
+        words = fit_warnings(fit_points("cam", SIZE, Points(times * seen.pixel, seen.ground, seen.height)), GRID)
+        assert sum(message in word for word in words) == 1
 
 
 class TestSquarePixels:

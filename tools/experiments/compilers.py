@@ -74,10 +74,8 @@ def main() -> None:
     rig, frames = options.rig, ":"
     if rig is None:
         rig, frames = prepared(Bench(options.data.resolve(), options.work.resolve()))
-    ways: dict[str, tuple[str, dict[str, str]]] = {
-        "default": (sys.executable, {}),
-        "plain": (sys.executable, {"STSEG_PLAIN_NUMBA": "1"}),
-    }
+    ways: dict[str, tuple[str, dict[str, str]]] = {"default": (sys.executable, {})}
+    ways["plain"] = sys.executable, {"STSEG_PLAIN_NUMBA": "1"}
     if options.python is not None:
         ways["other"] = options.python, {}
     files = {name: options.work / f"{name}.h5" for name in ways}

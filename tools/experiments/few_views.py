@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import combinations
-from math import comb
 from pathlib import Path
 
 import numpy as np
@@ -35,18 +33,8 @@ _GATE = 0.5
 """Distance within which a point is right, metres."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """One choice of cameras: scores and shares of wrong points, percent."""
-
-    chosen: str
-    moda: float
-    idf1: float
-    wrong: float
-    stated: float
-
-    def __str__(self) -> str:
-        return f"{self.chosen}: {self.moda:.1f} / {self.idf1:.1f}; {self.wrong:.1f}, stated {self.stated:.1f}"
+Row = tuple[str, float, float, float, float]
+"""One choice of cameras: MODA, IDF1, and the shares of points that are wrong, and that are stated to be, percent."""
 
 
 def recordings(data: Path, work: Path) -> dict[str, Callable[[int], Recorded]]:
@@ -84,7 +72,7 @@ def tracked(made: Recorded) -> Rows:
 def choices(cameras: int, number: int, most: int) -> Iterator[tuple[int, ...]]:
     """Choices of a number of cameras, `most` at most, evenly among all in their order."""
     every = list(combinations(range(cameras), number))
-    for k in np.unique(np.linspace(0, len(every) - 1, min(most, comb(cameras, number))).astype(int)):
+    for k in np.unique(np.linspace(0, len(every) - 1, min(most, len(every))).astype(int)):
         yield every[k]
 
 
@@ -99,14 +87,14 @@ def measured(made: Recorded, chosen: tuple[int, ...]) -> Row:
         found = found[(found["x"] >= x0) & (found["x"] <= x1) & (found["y"] >= y0) & (found["y"] <= y1)]
     wrong, stated = 1 - matched(found, truth, _GATE).mean(), 1 - point_probability(found).mean()
     named = "".join(str(k + 1) for k in chosen)
-    return Row(named, scores.moda or 0.0, scores.idf1, 100 * wrong, 100 * stated)
+    return named, scores.moda or 0.0, scores.idf1, 100 * wrong, 100 * stated
 
 
 def line(name: str, number: int, rows: list[Row]) -> list[object]:
     """One row of the table."""
-    values = np.array([(row.moda, row.idf1, row.wrong, row.stated) for row in rows])
+    values = np.array([row[1:] for row in rows])
     (moda, idf1, wrong, stated), least = values.mean(0), values.min(0)
-    worst = min(rows, key=lambda row: row.moda).chosen
+    worst = min(rows, key=lambda row: row[1])[0]
     scores = f"{moda:.1f} / {idf1:.1f}", f"{least[0]:.1f} / {least[1]:.1f}"
     return [name, number, len(rows), *scores, worst, f"{wrong:.1f}", f"{stated:.1f}"]
 
@@ -127,6 +115,6 @@ def main() -> None:
                 rows = []
                 for chosen in choices(len(made.rig.cameras), number, asked.choices):
                     rows.append(measured(made, chosen))
-                    print(f"{name}, {rows[-1]}", flush=True)
+                    print(name, *rows[-1], flush=True)
                 lines.append(line(name, number, rows))
                 write_table(asked.output / "few_views.csv", lines)

@@ -19,16 +19,7 @@ from stseg.simulation import SceneFilm, SceneSpec
 
 @dataclass(frozen=True)
 class Recorded:
-    """What cameras deliver, frame by frame, and the truth.
-
-    Attributes
-    ----------
-    rig, truth
-    frames
-        The observations of all cameras, one tuple a frame.
-    area
-        The rectangle that is scored, None for all.
-    """
+    """What cameras deliver, a tuple a frame, the truth, and the rectangle that is scored, None for all."""
 
     rig: Rig
     truth: Rows

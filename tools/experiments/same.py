@@ -32,20 +32,8 @@ _UNCOMPARED = ("timings", "provenance")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A run that is compared.
-
-    Attributes
-    ----------
-    name
-    rig
-        The rig file, written with $WORK.
-    frames, quick
-        Ranges of frames, A:B, of a whole and of a quick comparison.
-    options
-        Further options of `stseg run`.
-    inputs
-        Commands that make the rig file where it is not there.
-    """
+    """A run that is compared: its rig file, written with $WORK; frames A:B of a whole and a quick comparison; further
+    options of `stseg run`; and commands that make the rig file where it is not there."""
 
     name: str
     rig: str

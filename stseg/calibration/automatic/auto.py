@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -108,7 +108,7 @@ _FLOOR_CELL = 0.1
 
 
 def placed_views(single_cameras: Sequence[Floats], merged: MergedViews) -> Floats:
-    """All cameras on the ground of the first view, float64 (view, 12)."""
+    """All cameras on the ground of the first view, float64 (view, 14)."""
     back = [merged.placed[k].inverse for k in range(len(single_cameras))]
     ways = [(float(np.angle(one.factor)), np.array([one.shift.real, one.shift.imag]), abs(one.factor)) for one in back]
     return np.array([moved(view, *way) for view, way in zip(single_cameras, ways, strict=True)])
@@ -213,17 +213,13 @@ def require_merged(
         raise SourceError(names[worst], "", found, expected)
 
 
-def agreement_shares(places: Sequence[ViewPlaces], merged: MergedViews) -> list[float]:
+def agreement_shares(places: Sequence[ViewPlaces], merged: MergedViews) -> Floats:
     """Share of the common frames in which each view agrees with its best partner, 0..1."""
-    shares = []
-    for view in range(len(places)):
-        best = 0.0
-        for other in range(len(places)):
-            if other != view and view in merged.placed and other in merged.placed:
-                delay_frames = merged.placed[other].delay - merged.placed[view].delay
-                common = len(np.intersect1d(places[view].frame + delay_frames, places[other].frame))
-                best = max(best, float(merged.support[view, other]) / max(common, _MIN_ENDPOINTS))
-        shares.append(min(best, 1.0))
+    shares = np.zeros(len(places))
+    for view, other in permutations(merged.placed, 2):
+        delay_frames = merged.placed[other].delay - merged.placed[view].delay
+        common = len(np.intersect1d(places[view].frame + delay_frames, places[other].frame))
+        shares[view] = max(shares[view], min(merged.support[view, other] / max(common, _MIN_ENDPOINTS), 1.0))
     return shares
 
 

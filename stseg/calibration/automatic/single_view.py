@@ -41,7 +41,7 @@ def view_of_upright(endpoints: Endpoints, size: tuple[int, int], person_height: 
 
     Returns
     -------
-    float64 (12,), float
+    float64 (14,), float
         The camera (see `stseg.calibration.pinhole`), and the median head residual in body lengths.
     """
     coarse, fine = (endpoints.of(even_rows(len(endpoints), most)) for most in (_COARSE_PAIRS, _FINE_PAIRS))

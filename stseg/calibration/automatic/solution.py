@@ -70,7 +70,7 @@ class SolvedViews:
 
 
 def single_view_cameras(views: CalibrationInput, progress: Callable[[], None]) -> list[Floats]:
-    """Self-calibrate each view on a ground of its own, float64 (12,) each."""
+    """Self-calibrate each view on a ground of its own, float64 (14,) each."""
     single_cameras = []
     for endpoints, size in zip(views.endpoints, views.sizes, strict=True):
         single_cameras.append(view_of_upright(endpoints, size, views.person_height)[0])
@@ -80,11 +80,8 @@ def single_view_cameras(views: CalibrationInput, progress: Callable[[], None]) -
 
 def view_places(views: CalibrationInput, single_cameras: Sequence[Floats]) -> list[ViewPlaces]:
     """Ground points of each view's people, on its own ground."""
-    places = []
-    for endpoints, size, view in zip(views.endpoints, views.sizes, single_cameras, strict=True):
-        place = axis_of_foot(view, size, endpoints.foot, FORWARD)
-        places.append(ViewPlaces(endpoints.frame, place[:, 0] + 1j * place[:, 1]))
-    return places
+    cameras, axes = zip(views.endpoints, views.sizes, single_cameras, strict=True), np.array([1, 1j])
+    return [ViewPlaces(one.frame, axis_of_foot(view, size, one.foot, FORWARD) @ axes) for one, size, view in cameras]
 
 
 def refine_cameras(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> SolvedViews:
@@ -94,7 +91,7 @@ def refine_cameras(views: CalibrationInput, start: Floats, delay: Ints, progress
     ----------
     views
         Endpoints and image sizes.
-    start : float64 (view, 12)
+    start : float64 (view, 14)
         Initial cameras.
     delay : int64 (view,)
         Initial delays: a stream's own frame = the recording's frame + delay.
@@ -105,9 +102,10 @@ def refine_cameras(views: CalibrationInput, start: Floats, delay: Ints, progress
     spread = np.array([[0.07, 0.05], [0.03, 0.03]])
     for gate in _GATES:
         solution = _round(views, parameters, delay, gate, spread)
-        later = np.sign(_clock_frames(solution, views)) * np.ceil(np.abs(_clock_frames(solution, views)) - _OWN_FRAME)
-        if views.most_delay and later.any():
-            solution = _at_other_delay(views, solution, later.astype(np.int64), gate, spread)
+        for side in (1, -1):  # views that are late, then those that are early: both would meet at the other's place
+            later = side * np.maximum(np.ceil(side * _clock_frames(solution, views) - _OWN_FRAME), 0)
+            if views.most_delay and later.any():
+                solution = _at_other_delay(views, solution, later.astype(np.int64), gate, spread)
         delay, parameters, spread = solution.delay, solution.adjustment.parameters, _residual_spread(solution)
         progress()
     return replace(solution, delay=delay - delay[0])

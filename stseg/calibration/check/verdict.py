@@ -92,18 +92,9 @@ class _RawDisagreement:
         feet = field[:, [0, 2]] * self.scale[:, None]
         moved = (self.slope @ feet[..., None])[..., 0]
         right, down = field[:, [0, 2]].mean(axis=0).tolist()
-        return Disagreement(
-            view=self.view,
-            others=self.others,
-            people=len(field),
-            confirmed=self.confirmed,
-            feet=_size(field[:, [0, 2]]),
-            heads=_size(field[:, [0, 1]]),
-            right=right,
-            down=down,
-            ground=_size(moved),
-            pixels=_size(feet),
-        )
+        compared = (self.view, self.others, len(field), self.confirmed)
+        ends = (_size(field[:, [0, 2]]), _size(field[:, [0, 1]]))
+        return Disagreement(*compared, *ends, right, down, _size(moved), _size(feet))
 
 
 def _raw_disagreement(

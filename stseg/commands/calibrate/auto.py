@@ -85,11 +85,8 @@ def calibrate_auto(
         print("offsets: all within one frame; if the cameras are synchronous, say so (--most-delay 0)")
     print(
         f"{output}: {len(found.reports)} cameras, from {found.people} people and frames"
-        + (f" and {found.floor_marks} marks on the floor" if found.floor_marks else _NO_MARKS)
+        f"{f' and {found.floor_marks}' if found.floor_marks else '; no'} marks on the floor that views share"
     )
-
-
-_NO_MARKS = ", the floor shows no marks that views share"
 
 
 def _print(found: AutomaticCalibration, person_height: float, distances: Sequence[Distance]) -> None:

@@ -165,7 +165,5 @@ def _require_determined(path: Path, source: Floats, target: Floats, away: Floats
     motion = fit_motion(source, target * mirror, True)
     mirrored = np.linalg.norm(motion.of(source) - target * mirror, axis=1)
     if len(source) > 2 and np.linalg.norm(mirrored) < _MIRRORED * np.linalg.norm(away):
-        found = (
-            f"a mirrored ground ({mirrored.max():.2f} m off instead of {away.max():.2f} where the sign of y changes)"
-        )
+        found = f"a mirrored ground ({mirrored.max():.2f} m off, not {away.max():.2f}, where the sign of y changes)"
         raise CalibrationError(path, "y", found, "y counted upwards: change the sign of y")

@@ -32,6 +32,7 @@ from stseg.io.recording.video.ffmpeg import read_frame_rate, read_video_size
 
 Distance = tuple[str, float, float, float, float, float]
 """A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""
+Frames = tuple[int | None, int | None] | None
 _UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
@@ -78,7 +79,7 @@ def calibrate_auto(
     person_height: float = 1.7,
     distances: Sequence[Distance] = (),
     most_delay: float = 2.0,
-    frames: tuple[int | None, int | None] | None = None,
+    frames: Frames = None,
     background: str | None = None,
     source_kind: Literal["video", "masks"] = "video",
     cell: float = Grid.cell,
@@ -128,25 +129,16 @@ def calibrate_auto(
     require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
     known = [_known_distance(distance, names) for distance in distances]
-    counted = index_streams(streams)
-    for note in (*frame_rate_notes(paths, frame_rate), *counted.notes):
+    for note in frame_rate_notes(paths, frame_rate):
         reporter.note(note)
-    first, stop = _frame_range(frames, counted.length)
-    foregrounds = make_foregrounds(streams, Config(), first, stop, streams=counted)
-    views = CalibrationInput(
-        _endpoints(streams, counted, foregrounds, range(first, stop), reporter),
-        tuple(camera.size for camera in streams.rig.cameras),
-        frame_rate,
-        person_height,
-        most_delay,
-    )
+    views, backgrounds = people_of(streams, frames, person_height, most_delay, reporter)
     with reporter.progress("calibrating", steps_of(len(names))) as advance:
         solution = calibrate_from_people([str(path) for path in paths], views, lambda: advance(1))
     _require_ground(solution, known)
     if known:
         solution = adjusted_to(solution, known)
         views = replace(views, person_height=float(np.median(solution.adjustment.parameters.points[:, 2])))
-    floor_marks, backgrounds = 0, _background_images(foregrounds)
+    floor_marks = 0
     if backgrounds:
         solution, floor_marks = sharpen_by_floor(views, solution, backgrounds)
     if known:
@@ -164,6 +156,21 @@ def calibrate_auto(
         spread,
         tuple(measured(solution, known).tolist()),
     )
+
+
+def people_of(
+    streams: Recording, frames: Frames, person_height: float, most_delay: float, reporter: Reporter
+) -> tuple[CalibrationInput, list[Bytes]]:
+    """Feet and heads of the isolated people of a recording, and the empty scene in each view where there are images."""
+    counted = index_streams(streams)
+    for note in counted.notes:
+        reporter.note(note)
+    first, stop = _frame_range(frames, counted.length)
+    foregrounds = make_foregrounds(streams, Config(), first, stop, streams=counted)
+    endpoints = _endpoints(streams, counted, foregrounds, range(first, stop), reporter)
+    sizes = tuple(camera.size for camera in streams.rig.cameras)
+    views = CalibrationInput(endpoints, sizes, streams.rig.frame_rate, person_height, most_delay)
+    return views, _background_images(foregrounds)
 
 
 def camera_names(videos: Sequence[Path]) -> list[str]:
@@ -234,7 +241,7 @@ def _require_ground(solution: SolvedViews, known: Sequence[KnownDistance]) -> No
             raise ConfigError("--distance", str(number), "a pixel that shows no ground", "pixels where people walk")
 
 
-def _frame_range(frames: tuple[int | None, int | None] | None, length: int) -> tuple[int, int]:
+def _frame_range(frames: Frames, length: int) -> tuple[int, int]:
     given = FrameRange(*(frames or (0, min(length, _DEFAULT_FRAMES))))
     first, stop = given.first or 0, length if given.stop is None else min(given.stop, length)
     if not first < stop:

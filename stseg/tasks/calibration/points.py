@@ -134,8 +134,14 @@ def _sources(
 
 
 def fit_warnings(fit: PointFit, grid: Grid) -> list[str]:
-    """Warnings of a fit: badly spread points, or too few to check."""
-    deviation, words = fit.ground_deviation(grid), []
+    """Warnings of a fit: pixels of another image, badly spread points, or too few to check."""
+    deviation, words, size = fit.ground_deviation(grid), [], np.array(fit.camera.size)
+    if (reach := fit.points.pixel.max(axis=0) + 0.5).max() > 0 and ((reach < size / 2).all() or (reach > size).any()):
+        (u, v), (width, height) = reach.tolist(), size.tolist()
+        words.append(
+            f"{fit.camera.name}: its points reach to ({u:.0f}, {v:.0f}) in an image of {width} x {height} pixels: are "
+            "they pixels of an image of another size?"
+        )
     finite = deviation[np.isfinite(deviation)]
     share = float(np.mean(finite > grid.cell)) if len(finite) else 0.0
     if share > _UNCERTAIN_SHARE:
