@@ -21,6 +21,8 @@ _PRIOR_PEOPLE = 4.0
 """Weight of the prior of the spread: pairs of tracklets."""
 _PRIOR_TIME = 0.5
 """Prior time constant of an error, seconds."""
+_FARTHEST = 4.0
+"""Deviation of a row's size from which it is no size of the person, standard deviations: those who sit or bend."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +99,11 @@ class SizeModel:
         return cls(*(np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)]) for name in names))
 
     def evidence(self, sizes: Floats) -> tuple[Floats, Floats]:
-        """Precision of each measured size (n, size), and precision times deviation; 0 where unmeasured."""
-        measured = np.isfinite(sizes)
+        """Precision of each measured size (n, size), and precision times deviation; 0 where unmeasured or too far."""
+        deviation = np.nan_to_num(sizes - self.mean, nan=np.inf)
+        measured = np.abs(deviation) < _FARTHEST * np.sqrt(self.variance + self.spread)
         precision = np.where(measured, 1.0 / self.row_variance, 0.0)
-        return precision, np.where(measured, sizes - self.mean, 0.0) * precision
+        return precision, np.where(measured, deviation, 0.0) * precision
 
 
 def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], frame_rate: float) -> SizeModel:
@@ -150,9 +153,6 @@ def _spread(deviation: Floats, tracklets: Sequence[Ints], prior: SizePrior) -> f
 
     Errors of the two are independent unless they last as long, so no noise has to be subtracted.
     """
-    total = people = 0.0
-    for rows in tracklets:
-        third = max(len(rows) // 3, 1)
-        total += float(deviation[rows[:third]].mean() * deviation[rows[-third:]].mean())
-        people += 1.0
-    return max((total + _PRIOR_PEOPLE * prior.spread**2) / (people + _PRIOR_PEOPLE), 0.0)
+    thirds = [(rows, max(len(rows) // 3, 1)) for rows in tracklets]
+    total = sum(float(deviation[rows[:third]].mean() * deviation[rows[-third:]].mean()) for rows, third in thirds)
+    return max((total + _PRIOR_PEOPLE * prior.spread**2) / (len(tracklets) + _PRIOR_PEOPLE), 0.0)
