@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 from stseg.errors import FormatError
+from stseg.io.track_csv import read_rows
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import read_text
 from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, one_of, parse_whole
 
 
@@ -34,7 +33,7 @@ def read_answers(path: Path, actions: tuple[str, ...]) -> list[AnswerRow]:
         place = f"{path}: line {line}"
         action = cells.get("action", "")
         if action not in actions:
-            raise FormatError(path, f"line {line}", f"action {action!r}", one_of(action, actions))
+            raise FormatError(path, f"line {line}", f"action {abbreviated(action)}", one_of(action, actions))
         track, other, frame = (_whole(path, line, name, cells.get(name, "")) for name in ("id", "other", "frame"))
         if track is None:
             raise FormatError(path, f"line {line}", "no id", "the id of a track")
@@ -57,18 +56,7 @@ def read_names(path: Path) -> dict[int, str]:
 
 
 def _lines(path: Path, needed: tuple[str, ...]) -> list[tuple[int, dict[str, str]]]:
-    try:
-        reader = csv.reader(read_text(path).splitlines(), skipinitialspace=True)
-        header = [name.strip().lower() for name in next(reader, [])]
-        rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
-    except OSError as error:
-        raise FormatError(path, "", error.strerror or error, "a CSV file") from error
-    except (ValueError, csv.Error) as error:
-        raise FormatError(
-            path, "", "what is no text" if isinstance(error, UnicodeDecodeError) else error, "CSV"
-        ) from error
-    if missing := [name for name in needed if name not in header]:
-        raise FormatError(path, "header", ",".join(header) or "nothing", f"the columns {','.join(missing)}")
+    header, rows = read_rows(path, needed, limits.ROWS, skip_blanks=True)
     return [(line, {k: v.strip() for k, v in zip(header, row, strict=False)}) for line, row in rows]
 
 

@@ -15,7 +15,7 @@ from stseg.errors import FormatError
 from stseg.io.outputs.whole_files import replacing, require_output
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
-from stseg.io.untrusted.values import abbreviated, parse_number
+from stseg.io.untrusted.values import abbreviated, parse_number, require_once
 
 POSITION = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("flag", "<i8")])
 """One row per person and frame: metres on the ground; a flag other than 0 marks an unreliable row."""
@@ -127,8 +127,8 @@ def read_rows(
         require_regular(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file, skipinitialspace=skip_blanks)
-            header = [name.strip() for name in next(reader, [])]
-            rows = list(islice(((reader.line_num, row) for row in reader if row), most))
+            header = [name.strip().lower() for name in next(reader, [])]
+            rows = list(islice(((reader.line_num, row) for row in reader if any(map(str.strip, row))), most))
     except OSError as error:
         raise FormatError(path, "", error.strerror or error, "a CSV file that can be read") from error
     except (ValueError, csv.Error) as error:
@@ -136,6 +136,10 @@ def read_rows(
     if missing := [name for name in needed if name not in header]:
         found = ",".join(header)[: limits.NAME] or "nothing"
         raise FormatError(path, "header", found, f"columns {','.join(needed)} (no {', '.join(missing)})")
+    require_once(path, header)
+    for line, row in rows:
+        if any(map(str.strip, row[len(header) :])):
+            raise FormatError(path, f"line {line}", f"{len(row)} cells", f"{len(header)}, as in the header")
     return header, rows
 
 

@@ -15,6 +15,9 @@ A command turns an `StsegError` into one line on standard error and exit status 
 
 from __future__ import annotations
 
+_LONGEST_KEY = 300
+"""Characters of a key in an error: some stand in files."""
+
 
 def printable(text: str) -> str:
     """A text for the terminal: control characters, and bytes that are no UTF-8, as escapes."""
@@ -41,8 +44,8 @@ class InputError(StsegError):
     """
 
     def __init__(self, place: object, key: str, found: object, expected: str) -> None:
-        self.place, self.key, self.found, self.expected = str(place), key, str(found), expected
-        where = f"{self.place}: {key}" if key else self.place
+        self.place, self.key, self.found, self.expected = str(place), key[:_LONGEST_KEY], str(found), expected
+        where = f"{self.place}: {self.key}" if key else self.place
         super().__init__(printable(" ".join(f"{where}: found {self.found}, expected {expected}".splitlines())))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:

@@ -94,6 +94,8 @@ def read_cameras(format: str, files: Sequence[Path], options: ImportOptions) -> 
     if len(cameras) > limits.CAMERAS:
         raise FormatError(place, "", f"{len(cameras)} cameras", f"at most {limits.CAMERAS}")
     for camera in cameras:
+        if not (np.abs(camera.projection) <= limits.NUMBER).all():
+            raise CalibrationError(place, f"camera {camera.name}".strip(), "numbers beyond any camera's", "usual ones")
         if camera.name and not is_name(camera.name):
             raise FormatError(place, "camera", abbreviated(camera.name), EXPECTED)
     return cameras

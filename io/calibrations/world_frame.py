@@ -91,12 +91,9 @@ def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False)
     """
     height = median_height(cameras, World("m", up, mirrored))
     if height <= 0:
-        raise CalibrationError(
-            cameras[0].file,
-            "camera centres",
-            f"cameras below the ground with {up} upwards",
-            f"them above it: give {'' if mirrored else '--mirrored where the calibration is left-handed, or '}--up",
-        )
+        mirror = "" if mirrored else "--mirrored where the calibration is left-handed, or "
+        found, expected = f"cameras below the ground with {up} upwards", f"them above it: give {mirror}--up"
+        raise CalibrationError(cameras[0].file, "camera centres", found, expected)
     return _likeliest_unit(height)
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from stseg.errors import FormatError
-from stseg.io.detections.masks import Polygons, flat_polygons
+from stseg.io.detections.masks import Polygons, polygons
 from stseg.io.detections.record import (
     DetectionList,
     Detections,
@@ -55,8 +56,7 @@ def _add_shape(path: Path, found: DetectionList, place: str, frame: int, shape: 
         corners = [shape.get(key, "") for key in ("xtl", "ytl", "xbr", "ybr")]
         found.add_corners(place, frame, corners, label=label)
     elif shape.tag == "polygon":
-        flat = [number(path, place, "points", word) for word in shape.get("points", "").replace(";", ",").split(",")]
-        mask = _polygon(path, place, flat)
+        mask = _polygon(path, place, (pair.split(",") for pair in shape.get("points", "").split(";")))
         found.add(place, frame, mask.box(), label=label, mask=mask)
     else:
         _refuse_area(path, place, shape.tag)
@@ -68,11 +68,12 @@ def _refuse_area(path: Path, place: str, kind: object) -> None:
         raise FormatError(path, place, f"a shape {kind}", "rectangles and polygons")
 
 
-def _polygon(path: Path, place: str, flat: list[float]) -> Polygons:
+def _polygon(path: Path, place: str, points: Iterable[Sequence[object]], scale: Sequence[float] = (1, 1)) -> Polygons:
     try:
-        return flat_polygons([flat])
-    except ValueError as error:
-        raise FormatError(path, place, str(error), "u,v of 3 or more points") from error
+        pairs = [[number(path, place, "points", one) for one in (u, v)] for u, v in points]
+        return polygons([np.array(pairs) * scale])
+    except (TypeError, ValueError) as error:
+        raise FormatError(path, place, f"points: {error}", "u,v of 3 or more points") from error
 
 
 def is_label_studio(data: Any) -> bool:
@@ -88,9 +89,13 @@ def read_label_studio(request: Request, data: Any) -> Detections:
     if videos and len(data) > 1:
         raise FormatError(request.path, "", f"{len(data)} tasks", "one camera: its video alone, or a file for each")
     if videos:
+        lengths = list[int]()
         for index, one in enumerate(videos):
-            _add_video_track(request, found, f"result {index}", one["value"])
-        return found.done(max((int(one["value"].get("framesCount", 0)) for one in videos), default=0) or None)
+            place = f"result {index}"
+            value = required_value(request.path, place, one, "value")
+            _add_video_track(request, found, place, value)
+            lengths.append(int(number(request.path, place, "framesCount", value.get("framesCount", 0))))
+        return found.done(max(lengths) or None)
     names = [str(next(iter(task.get("data", {}).values()), k)) for k, task in enumerate(data)]
     frames, count = listed_frames(request.path, names)
     for k, (rows, frame) in enumerate(zip(results, frames.tolist(), strict=True)):
@@ -117,8 +122,8 @@ def _add_result(request: Request, found: DetectionList, place: str, frame: int, 
         label = str(next(iter(value.get("rectanglelabels", [])), ""))
         found.add(place, frame, (x * width, y * height, wide * width, tall * height), label=label)
     elif one.get("type") == "polygonlabels":
-        points = np.array(value["points"], float) / 100 * [width, height]
-        mask = _polygon(request.path, place, points.ravel().tolist())
+        points = required_value(request.path, place, value, "points")
+        mask = _polygon(request.path, place, points, (width / 100, height / 100))
         found.add(place, frame, mask.box(), label=str(next(iter(value.get("polygonlabels", [])), "")), mask=mask)
     else:
         _refuse_area(request.path, place, one.get("type"))
@@ -174,8 +179,8 @@ def read_via(request: Request, data: Any) -> Detections:
                 box = [required_value(request.path, place, shape, key) for key in _PERCENT]
                 found.add(place, frame, box, label=label)
             elif shape.get("name") == "polygon":
-                points = np.column_stack([required_value(request.path, place, shape, f"all_points_{a}") for a in "xy"])
-                mask = _polygon(request.path, place, points.ravel().tolist())
+                axes = [required_value(request.path, place, shape, f"all_points_{a}") for a in "xy"]
+                mask = _polygon(request.path, place, [*zip_longest(*axes)])
                 found.add(place, frame, mask.box(), label=label, mask=mask)
             else:
                 _refuse_area(request.path, place, shape.get("name"))

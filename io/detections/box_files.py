@@ -18,7 +18,7 @@ from stseg.errors import FormatError, SourceError
 from stseg.io.detections.record import Detections
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numpy_files import read_npy
-from stseg.io.untrusted.values import parse_number
+from stseg.io.untrusted.values import parse_number, require_once
 
 _NEEDED = ("frame", "left", "top", "width", "height")
 _FEATURES = "a .npy array of numbers, one row a detection"
@@ -164,6 +164,7 @@ def _header_columns(path: Path, line: int, header: list[str]) -> tuple[int, ...]
     if missing:
         expected = f"a header with {', '.join(_NEEDED)}, or lines of MOTChallenge"
         raise FormatError(path, f"line {line}", f"no column {', '.join(missing)}", expected)
+    require_once(path, names)
     wanted = (*_NEEDED, "score") if "score" in names else _NEEDED
     return tuple(names.index(name) for name in wanted)
 

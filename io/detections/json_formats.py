@@ -24,6 +24,7 @@ from stseg.io.detections.record import (
     require_size,
     required_value,
 )
+from stseg.io.untrusted.values import abbreviated
 
 _KEYS = ("xmin", "ymin", "xmax", "ymax")
 
@@ -50,9 +51,8 @@ def read_coco_results(request: Request, data: Any) -> Detections:
         return _collect(request, data, None, {})
     listed = read_json(request.source.image_list)
     if not (isinstance(listed, dict) and isinstance(listed.get("images"), list)):
-        raise FormatError(
-            request.source.image_list, "images", "nothing", "the images of COCO results: id and file_name of each"
-        )
+        expected = "the images of COCO results: id and file_name of each"
+        raise FormatError(request.source.image_list, "images", "nothing", expected)
     return _collect(request, data, listed["images"], _categories(request.source.image_list, listed))
 
 
@@ -64,11 +64,11 @@ def read_dataset(request: Request, data: Any) -> Detections:
 
 def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Mapping[Any, str]) -> Detections:
     frame_of, frames = _frames(request, images) if images is not None else ({}, None)
-    others = {one.get("id") for one in images or ()} - set(frame_of)
+    others = {_id(request.path, f"image {k}", one, "id") for k, one in enumerate(images or ())} - set(frame_of)
     found = DetectionList(request.path)
     for index, row in enumerate(rows):
         place = f"detection {index}"
-        image = required_value(request.path, place, row, "image_id")
+        image = _id(request.path, place, row, "image_id")
         if images is None:
             frame = _own_number(request.path, place, image)
         elif image in frame_of:
@@ -77,7 +77,7 @@ def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Map
             continue
         else:
             raise FormatError(request.path, place, f"image_id {image!r}", "the id of an image in the image list")
-        category = row.get("category_id", "")
+        category = _id(request.path, place, row, "category_id") if "category_id" in row else ""
         mask = _mask(request.path, place, row.get("segmentation"))
         box = row.get("bbox") or (mask.box() if mask is not None else required_value(request.path, place, row, "bbox"))
         found.add(place, frame, box, row.get("score", 1.0), categories.get(category, str(category)), mask)
@@ -88,14 +88,13 @@ def _frames(request: Request, images: Any) -> tuple[dict[Any, int], int | None]:
     """Frame of each image id among the selected images, and their number."""
     chosen = list[tuple[Any, str]]()
     for k, one in enumerate(images):
-        number, name = required_value(request.path, f"image {k}", one, "id"), str(one.get("file_name", ""))
+        number, name = _id(request.path, f"image {k}", one, "id"), str(one.get("file_name", ""))
         if not request.source.select or fnmatch(name, request.source.select):
             require_size(request, f"image {k}", one.get("width"), one.get("height"))
             chosen.append((number, name))
     if not chosen:
-        raise SourceError(
-            request.path, "select", f"no image like {request.source.select!r}", "a pattern of image names"
-        )
+        found = f"no image like {request.source.select!r}"
+        raise SourceError(request.path, "select", found, "a pattern of image names")
     frames, count = listed_frames(request.path, [name for _, name in chosen])
     return dict(zip((image for image, _ in chosen), frames.tolist(), strict=True)), count
 
@@ -110,9 +109,15 @@ def _own_number(path: Path, place: str, image: Any) -> int:
     return int(numbers[0])
 
 
+def _id(path: Path, place: str, values: Any, key: str) -> Any:
+    if not isinstance(found := required_value(path, place, values, key), int | float | str):
+        raise FormatError(path, place, f"{key} {abbreviated(found)}", "a number or a text")
+    return found
+
+
 def _categories(path: Path, data: Mapping[str, Any]) -> dict[Any, str]:
     return {
-        required_value(path, f"category {k}", one, "id"): str(one.get("name", one["id"]))
+        _id(path, f"category {k}", one, "id"): str(one.get("name", one["id"]))
         for k, one in enumerate(data.get("categories", []))
     }
 
@@ -124,7 +129,7 @@ def _mask(path: Path, place: str, segmentation: Any) -> Mask | None:
         if isinstance(segmentation, dict):
             return run_lengths(segmentation["size"], segmentation["counts"])
         return flat_polygons(segmentation)
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise FormatError(path, place, f"a segmentation: {error}"[:100], "polygons, or run lengths") from error
 
 
@@ -156,7 +161,7 @@ def _add(request: Request, found: DetectionList, place: str, frame: int, row: An
     for corners, score, label, mask in zip(boxes, scores, labels, masks, strict=True):
         try:
             drawn = None if mask is None else run_lengths(mask["size"], mask["counts"])
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, KeyError, OverflowError) as error:
             raise FormatError(request.path, place, f"a mask: {error}"[:100], "run lengths as COCO's") from error
         found.add_corners(place, frame, corners, score, str(label), drawn)
 
@@ -183,7 +188,6 @@ def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Dete
                 if corners != [-1, -1, -1, -1]:
                     found.add_corners(place, frame, corners, label="person")
     if not has_view:
-        raise FormatError(
-            request.path, f"view {request.source.view}", "no such viewNum", "the camera's number in the files: view"
-        )
+        expected = "the camera's number in the files: view"
+        raise FormatError(request.path, f"view {request.source.view}", "no such viewNum", expected)
     return found.done(count)

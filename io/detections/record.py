@@ -25,6 +25,7 @@ from stseg.io.untrusted.values import abbreviated, finite_number, parse_number
 
 LEAST_NUMBERS = ("frame", "left", "top", "width", "height", "score")
 _DIGITS, _LAST_DIGITS = re.compile(r"[0-9]+"), re.compile(r"[0-9]+(?=[^0-9]*\Z)")
+_ENDING = re.compile(r"(?<=[^/.])\.[^/.]+\Z")
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,7 @@ def listed_frames(path: Path, names: Sequence[str]) -> tuple[Ints, int | None]:
     """
     numbers = last_numbers(names)
     if numbers is None:
-        series = Counter(_LAST_DIGITS.sub("", str(PurePath(name).with_suffix(""))) for name in names)
+        series = Counter(_LAST_DIGITS.sub("", _ENDING.sub("", name)) for name in names)
         if len(series) > 1 and min(series.values()) > 1:
             raise FormatError(path, "", f"images of {len(series)} cameras", "one camera: `select`, or a file for each")
         return np.arange(len(names), dtype=np.int64), len(names)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from stseg.errors import FormatError, SourceError
+from stseg.errors import FormatError
 from stseg.io.detections.record import DetectionList, Detections, Request, number, required_value
 from stseg.io.extras import load_extra
+from stseg.io.track_csv import read_rows
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
 from stseg.io.untrusted.values import one_of, parse_number
@@ -42,16 +41,8 @@ _CLASSES = (
 
 def read_csv(request: Request) -> Detections:
     """Boxes of a CSV file with a header."""
-    try:
-        with request.path.open(encoding="utf-8-sig", newline="") as lines:
-            rows = list(islice(csv.reader(lines, skipinitialspace=True), limits.ROWS))
-    except OSError as error:
-        raise SourceError(request.path, "", error.strerror or error, "a file of boxes") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FormatError(request.path, "", error, "CSV in UTF-8") from error
-    header = [name.strip() for name in rows[0]] if rows else []
-    places = ((f"line {line}", row) for line, row in enumerate(rows[1:], 2) if any(map(str.strip, row)))
-    return _collect(request, header, [(place, row) for place, row in places])
+    header, rows = read_rows(request.path, (), limits.ROWS, skip_blanks=True)
+    return _collect(request, header, [(f"line {line}", row) for line, row in rows])
 
 
 def read_parquet(request: Request) -> Detections:

@@ -17,7 +17,7 @@ from stseg.io.untrusted.bounded_files import read_text
 
 _POSE = frozenset(5 + keypoints + after for keypoints in (34, 51) for after in (0, 1, 2))
 """Numbers in a line of a pose model: box, 17 keypoints of 2 or 3 numbers, and perhaps confidence and track id."""
-_ENTRY = re.compile(r"^\s*(?:(\d+)\s*:|-)\s*['\"]?([^'\"#]+?)['\"]?\s*(?:#.*)?$")
+_ENTRY = re.compile(r"^\s*(?:(\d{1,9})\s*:|-)\s*['\"]?([^'\"#]+?)['\"]?\s*(?:#.*)?$")
 
 
 def text_files(folder: Path) -> list[Path]:
@@ -64,8 +64,8 @@ def _boxed(request: Request, place: str, values: list[float], sixth_is_id: bool)
     if not 5 <= len(values) <= 7:
         raise FormatError(request.path, place, f"{len(values)} numbers", "class, x, y, width, height, and perhaps more")
     (width, height), (_, x, y, wide, tall) = request.size, values[:5]
-    if max(x, y, wide, tall) > 1.5:
-        raise FormatError(request.path, place, f"{max(x, y, wide, tall):g}", "shares of the image, 0..1")
+    if (largest := max((x, y, wide, tall), key=abs)) > 1.5 or largest < -1.5:
+        raise FormatError(request.path, place, f"{largest:g}", "shares of the image, 0..1")
     score = values[5] if len(values) > 5 and not (len(values) == 6 and sixth_is_id) else 1.0
     return ((x - wide / 2) * width, (y - tall / 2) * height, wide * width, tall * height), score
 

@@ -182,12 +182,8 @@ class ArrivingVideos:
             size = self._size
         if size != self._size:
             found = f"{size} bytes, of which only the first {self._size} were there when it was read"
-            raise SourceError(
-                self._path,
-                f"camera {self._camera.name}",
-                found,
-                "live.file_quiet_time above the pauses of the recorder",
-            )
+            expected = "live.file_quiet_time above the pauses of the recorder"
+            raise SourceError(self._path, f"camera {self._camera.name}", found, expected)
 
     def _end(self) -> None:
         self.close()

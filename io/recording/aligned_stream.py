@@ -44,12 +44,9 @@ class AlignedStream:
     def require_start(self, first: int) -> None:
         """Raise SourceError where a required camera starts after frame `first` of the recording."""
         if self.required and first < self.source.offset:
-            raise SourceError(
-                self.source.source.path,
-                f"camera {self.camera.name}, frame {first}",
-                f"a stream that starts at frame {self.source.offset}",
-                'one that shows it, or on_missing = "blind"',
-            )
+            place, expected = f"camera {self.camera.name}, frame {first}", 'one that shows it, or on_missing = "blind"'
+            found = f"a stream that starts at frame {self.source.offset}"
+            raise SourceError(self.source.source.path, place, found, expected)
 
     def read(self, frame: int) -> Observation:
         """The observation at a frame, None where the camera is blind; frames are read in rising order."""

@@ -167,9 +167,8 @@ def open_stream(
     SourceError, FormatError where the source is missing, empty or not of its kind.
     """
     if source.address:
-        raise SourceError(
-            mask_passwords(source.address), f"camera {camera.name}", "a live stream", "files; or stseg run --follow"
-        )
+        place, expected = mask_passwords(source.address), "files; or stseg run --follow"
+        raise SourceError(place, f"camera {camera.name}", "a live stream", expected)
     if source.detector is not None:
         expected = "boxes: stseg detect makes them, and a rig file with them; stseg run makes its own"
         raise SourceError(source.path, f"camera {camera.name}, detector", "a video without its boxes", expected)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -14,11 +15,13 @@ from reprlib import Repr
 
 import numpy as np
 
-from stseg.errors import OutputError
+from stseg.errors import FormatError, OutputError
 from stseg.io.untrusted import limits
 
 _LONGEST_VALUE = 60
 """Characters of a value in an error."""
+_LONGEST_LIST = 600
+"""Characters of a list of names in an error: those of all our own fit."""
 _REPR = Repr()
 _REPR.maxlevel, _REPR.maxlist, _REPR.maxdict = 2, 8, 4
 _REPR.maxstring = _REPR.maxother = _LONGEST_VALUE
@@ -72,6 +75,13 @@ def require_utf8(path: Path, purpose: str) -> None:
         raise OutputError(path, "", "a path that is no UTF-8", f"one that is, for {purpose}") from error
 
 
+def require_once(path: Path, header: Iterable[str]) -> None:
+    """Refuse a table that has two columns of one name; raises FormatError."""
+    twice = [name for name, count in Counter(header).items() if name and count > 1]
+    if twice:
+        raise FormatError(path, "header", f"the column {twice[0][: limits.NAME]} twice", "each once")
+
+
 def parse_number(text: str) -> float:
     """A finite decimal number from text; nan for anything else.
 
@@ -112,7 +122,9 @@ def one_of(name: object, names: Iterable[str]) -> str:
     """Expectation of an error in place of an unknown name: all names, and the one most like it."""
     names = tuple(names)
     close = get_close_matches(str(name)[:_LONGEST_VALUE], names, 1)
-    return f"one of {', '.join(names)}" + (f"; did you mean {close[0]}?" if close else "")
+    known = ", ".join(names)
+    beginning = known if len(known) <= _LONGEST_LIST else f"{known[:_LONGEST_LIST]}..."
+    return f"one of {beginning}" + (f"; did you mean {close[0][:_LONGEST_VALUE]}?" if close else "")
 
 
 def abbreviated(value: object) -> str:

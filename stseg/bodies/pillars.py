@@ -58,7 +58,8 @@ class BodyTable(NamedTuple):
         pixel = np.full((len(y), len(x), len(LEVELS), 2), np.nan, np.float32)
         for k, level in enumerate(LEVELS):
             place, ahead = camera.project(ground, float(level))
-            pixel[:, :, k] = np.where(ahead[..., None], place, np.nan)
+            with np.errstate(over="ignore"):  # beyond any image
+                pixel[:, :, k] = np.where(ahead[..., None], place, np.nan)
         return cls((float(x[0]), float(y[0])), step, pixel, camera.size, breadth)
 
     def boxes(self, ground: Floats, heights: Floats) -> Floats:

@@ -71,9 +71,8 @@ def _frame(run: Run, wanted: dict[str, str], text: str) -> int:
     if "frame" in wanted:
         requested = _number("frame", wanted["frame"])
         if requested not in run.frames:
-            raise ConfigError(
-                "command line", "--slice frame", wanted["frame"], f"a frame of the run, {first} to {last}"
-            )
+            expected = f"a frame of the run, {first} to {last}"
+            raise ConfigError("command line", "--slice frame", wanted["frame"], expected)
         return int(requested)
     requested = _number("t", wanted["t"]) * run.frame_rate
     nearest = int(run.frames[np.abs(run.frames - requested).argmin()]) if np.isfinite(requested) else first

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import h5py
-import numpy as np
 import pytest
 from attacks import RIG, write_rig
 from cases import cases
@@ -21,25 +20,9 @@ from stseg.io.untrusted import safe_hdf5
 from stseg.kernels.accelerate import COMPILED, kernel
 from stseg.kernels.cache import KernelFolder
 
-
-def spoil_column(file: h5py.File, table: str, column: str, value: float) -> None:
-    rows = file[table][:]
-    rows[column][0] = value
-    file[table][...] = rows
-
-
 SPOILED: dict[str, Callable[[h5py.File], object]] = {
-    "fps 0": lambda file: file["trajectory"].attrs.__setitem__("fps", 0.0),
-    "fps nan": lambda file: file["trajectory"].attrs.__setitem__("fps", np.nan),
-    "fps 1e308": lambda file: file["trajectory"].attrs.__setitem__("fps", 1e308),
-    "frame -1": lambda file: spoil_column(file, "trajectory", "frame", -1),
-    "frame 2^62": lambda file: spoil_column(file, "trajectory", "frame", 2**62),
-    "x nan": lambda file: spoil_column(file, "trajectory", "x", np.nan),
-    "id of no track": lambda file: spoil_column(file, "trajectory", "id", 77),
     "10^12 rows": lambda file: file["trajectory"].resize((10**12,)),
-    "kept 5": lambda file: file["entry/occupancy"].attrs.__setitem__("kept", 5),
     "no tracks": lambda file: file["tracks"].resize((0,)),
-    "camera ..": lambda file: file.attrs.__setitem__("cameras", ["..", "../../evil"]),
     "rig of other size": lambda file: file["provenance/rig"].__setitem__((), RIG),
 }
 
@@ -82,46 +65,18 @@ def test_links_out_of_a_run_path_are_refused(run_path: Path, tmp_path: Path, ref
     refusal("inspect", run_path)
 
 
-@pytest.mark.parametrize("command", ["review", "measure", "export --to geojson"])
-@pytest.mark.parametrize("column", ["id", "first"])
-def test_tracks_unlike_their_rows_are_refused(run_path: Path, refusal: Command, command: str, column: str) -> None:
-    with h5py.File(run_path, "r+") as file:
-        rows = file["tracks"][:]
-        rows[column][0] = {"id": 90, "first": 0}[column]
-        rows["last"][0] += column == "first"
-        file["tracks"][...] = rows
-    assert "/tra" in refusal(*command.split(), run_path, "-o", run_path.with_name("output.html"))
-
-
-@pytest.mark.parametrize("name", ["label", "frame", "views"])
-def test_whole_numbers_stored_as_floats_are_refused(run_path: Path, refusal: Command, name: str) -> None:
-    with h5py.File(run_path, "r+") as file:
-        group = file["entry/occupancy"]
-        values = group[name][:].astype(float)
-        del group[name]
-        group[name] = values
-    assert "found the type float64" in refusal("inspect", run_path)
-
-
-def test_a_heap_that_never_ends_is_refused(run_path: Path, refusal: Command) -> None:
-    """HDF5 walks on the spot where the free space of a global heap, object 0, has a false size."""
+@pytest.mark.parametrize("size", [None, 0, 15, 2**62])
+def test_a_heap_that_never_ends_is_refused(run_path: Path, refusal: Command, size: int | None) -> None:
+    """HDF5 walks on the spot where a global heap, or its free space, object 0, has a false size."""
     contents = bytearray(run_path.read_bytes())
     start = contents.rindex(b"GCOL\x01\0\0\0")
     place = start + 16
     while contents[place : place + 2] != b"\0\0":
         place += 16 + -(-int.from_bytes(contents[place + 8 : place + 16], "little") // 8) * 8
-    contents[place + 8 : place + 16] = (0).to_bytes(8, "little")
+    place = start if size is not None else place
+    contents[place + 8 : place + 16] = (size or 0).to_bytes(8, "little")
     run_path.write_bytes(contents)
-    assert f"a global heap at byte {start}: 0 bytes free" in refusal("inspect", run_path)
-
-
-@pytest.mark.parametrize("size", [0, 15, 2**62])
-def test_a_heap_of_false_size_is_refused(run_path: Path, refusal: Command, size: int) -> None:
-    contents = bytearray(run_path.read_bytes())
-    start = contents.index(b"GCOL\x01\0\0\0")
-    contents[start + 8 : start + 16] = size.to_bytes(8, "little")
-    run_path.write_bytes(contents)
-    assert f"a global heap at byte {start}" in refusal("inspect", run_path)
+    assert f"a global heap at byte {start}{': 0 bytes free' * (size is None)}" in refusal("inspect", run_path)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded there alone")
@@ -157,26 +112,11 @@ def test_a_file_is_examined_once_and_again_when_it_has_changed(run_path: Path, m
     refused(FormatError, "a link that leads elsewhere", read_run, run_path)
 
 
-@pytest.mark.parametrize(
-    "frames", ["0:300000000", "0:9999999999999", "9" * 5000, "0:" + "9" * 5000, "\u0663:\u0665", "5:3"]
-)
+@pytest.mark.parametrize("frames", ["0:300000000", "9" * 5000, "0:" + "9" * 5000, "\u0663:\u0665", "5:3"])
 def test_ranges_of_frames_are_bounded(tmp_path: Path, run_path: Path, refusal: Command, frames: str) -> None:
     (tmp_path / "truth.csv").write_text("frame,id,x,y\n0,1,0,0\n")
     refusal("evaluate", run_path, tmp_path / "truth.csv", "--frames", frames)
     refusal("run", write_rig(tmp_path), "-o", tmp_path / "q.h5", "--frames", frames)
-
-
-def test_twenty_thousand_people_in_a_frame_are_refused(tmp_path: Path, run_path: Path, refusal: Command) -> None:
-    (tmp_path / "truth.csv").write_text("frame,id,x,y\n" + "".join(f"0,{k},0,0\n" for k in range(20_000)))
-    assert "people in a frame" in refusal("evaluate", run_path, tmp_path / "truth.csv")
-
-
-@pytest.mark.parametrize(
-    "option",
-    [("--seconds", "nan"), ("--frame-rate", "inf"), ("--size", "100000,100000"), ("--size", "9" * 5000 + ",1")],
-)
-def test_simulations_are_bounded(tmp_path: Path, refusal: Command, option: tuple[str, str]) -> None:
-    refusal("simulate", tmp_path / "scene", "--scene", "tiny", *option)
 
 
 @cases()

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -95,7 +96,7 @@ def test_homographies_of_pom_need_size_and_unit(size: Any, unit: str | None, mis
 
 
 READERS: dict[str, Callable[[Path], object]] = {
-    "answers": partial(read_answers, actions=("split", "swap")), "names": read_names, "tracks": read_tracks_csv,
+    "answers": partial(read_answers, actions=("split", "swap", "name")), "names": read_names, "tracks": read_tracks_csv,
 }  # fmt: skip
 
 
@@ -106,11 +107,14 @@ def test_tables_are_refused(tmp_path: Path, reader: str, text: str, message: str
 
 
 def put(file: h5py.File, name: str, value: Any, **keys: Any) -> None:
-    """An object in place of another; an attribute is `object@name`."""
-    name, _, attribute = name.partition("@")
-    if attribute:
-        file[name].attrs[attribute] = value
+    """An object in place of another; an attribute is `object@name`, a column's first value `object.column`."""
+    name, mark, part = re.split("([@.]|$)", name, maxsplit=1)
+    if mark == "@":
+        file[name].attrs[part] = value
         return
+    if mark:
+        rows = file[name][:]
+        rows[part][0], value = value, rows
     rate = file[name].attrs.get("fps", 1.0) if name in file else 1.0
     if name in file:
         del file[name]
@@ -120,6 +124,7 @@ def put(file: h5py.File, name: str, value: Any, **keys: Any) -> None:
 CELLS = np.zeros((6, 3, 4, 6), "i4")
 GROWING = {"maxshape": (None, 3, 4, 6), "chunks": (65, 3, 4, 6)}
 LONG = "x" * 9999
+MADE: dict[str, Callable[..., Any]] = {"twice": lambda rows: np.repeat(rows, 2), "as floats": lambda rows: rows + 0.0}
 
 
 @cases(
@@ -137,7 +142,8 @@ def test_objects_are_refused(run_path: Path, name: str, value: Any, part: str, m
         if value is GROWING:
             put(file, name, CELLS, **GROWING)
         else:
-            put(file, name, np.repeat(file[name][:], 2) if isinstance(value, str) and value == "twice" else value)
+            make = MADE.get(value) if isinstance(value, str) else None
+            put(file, name, value if make is None else make(file[name][:]))
         if "shown" in name:
             file[name].attrs["camera"] = "left"
 
@@ -253,6 +259,7 @@ def test_names_of_three_kinds(question: Callable[[object], bool], wrong: list[ob
 _BEGIN, _SEVEN = "GCOL\1\0\0\0", "\0" * 7
 HEAPS = f"{_BEGIN}\x40{_SEVEN}\1{_SEVEN}\x10{_SEVEN}{_BEGIN}{_SEVEN}\0{_SEVEN}\0\x10{_SEVEN}"
 """A heap of an object, in which another one begins, and of 16 free bytes."""
+CROWD = "frame,id,x,y\n" + "".join(f"0,{k},0,0\n" for k in range(20_000))
 
 
 @pytest.mark.parametrize(
@@ -260,9 +267,11 @@ HEAPS = f"{_BEGIN}\x40{_SEVEN}\1{_SEVEN}\x10{_SEVEN}{_BEGIN}{_SEVEN}\0{_SEVEN}\0
     [
         (ValueError, lambda _: parse_toml("#" * (limits.TEXT_FILE + 1)), "characters, more than"),
         (FormatError, lambda at: read_tracks_csv(text(at / "t.csv", "frame,id,x,y\n3e7,1,0,0")), "a frame up to 2"),
+        (FormatError, lambda at: read_tracks_csv(text(at / "t.csv", CROWD)), "20000 rows of frame 0, expected at most"),
         (SourceError, lambda at: read_video_size(at), "no regular file, expected a video"),
         (SourceError, lambda at: read_video_size(text(at / "a.avi", "")), "no frame that decodes"),
         (SourceError, lambda at: read_video_size(text(at / "a.avi", "\ufeff#EXTM3U")), "a text, such as a playlist"),
+        (SourceError, lambda at: read_video_size(text(at / "a.avi", "ffconcat version 1.0\nfile a.avi")), "playlist"),
         (OSError, lambda at: read_bytes(at), "Is a directory"),
         (ValueError, lambda at: read_bytes(pipe(at / "a")), "what is no regular file"),
         (ValueError, lambda at: read_bytes(text(at / "a", "abc"), 2), "more than 2 bytes"),

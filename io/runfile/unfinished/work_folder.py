@@ -66,7 +66,7 @@ class WorkFolder:
     """
 
     def __init__(self, output: Path, request: dict[str, Any]) -> None:
-        self.output, self.path = output, output.with_name(f"{output.name}.segments")
+        self.output, self.path = output, output.parent / f"{output.name}.segments"
         self._request = request
         self._lock: BinaryIO | None = None
         self.broken: list[Path] = []

@@ -56,9 +56,8 @@ def calibrate_lens(
     require_output(output, overwrite, Inputs([video]))
     columns, rows = (int(side) for side in numbers("--board", board, "columns,rows of inner corners", 2))
     if min(columns, rows) < 3 or every < 1 or not square > 0:
-        raise ConfigError(
-            "--board, --every, --square", "", f"{board}, {every}, {square:g}", "3 or more; 1 or more; above 0"
-        )
+        given = f"{board}, {every}, {square:g}"
+        raise ConfigError("--board, --every, --square", "", given, "3 or more; 1 or more; above 0")
     camera = uncalibrated_camera(video.stem, video)
     stream, size = open_stream(Source("video", video), camera), camera.size
     found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []

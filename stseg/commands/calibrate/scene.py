@@ -109,9 +109,8 @@ def size_of(text: str) -> tuple[int, int]:
     """Width and height from the command line."""
     width, height = numbers("--size", text, "width,height in whole pixels", 2)
     if width != int(width) or height != int(height) or min(width, height) < 1 or width * height > limits.PIXELS:
-        raise ConfigError(
-            "--size", "", abbreviated(text), f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
-        )
+        expected = f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
+        raise ConfigError("--size", "", abbreviated(text), expected)
     return int(width), int(height)
 
 

@@ -177,12 +177,12 @@ def _publisher(
 
 def live_table_of(output: Path) -> Path:
     """Path of the live table, the tracks of a run in progress."""
-    return output.with_name(f"{output.name}.live.csv")
+    return output.parent / f"{output.name}.live.csv"
 
 
 def live_corrections_of(output: Path) -> Path:
     """Path of the table of ids of the live table that are corrected."""
-    return output.with_name(f"{output.name}.live_corrections.csv")
+    return output.parent / f"{output.name}.live_corrections.csv"
 
 
 def last_frame(frames: FrameRange | None) -> int:
