@@ -129,7 +129,7 @@ def main() -> None:
     """Watch, then break."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="beginning of the paths whose checks are broken")
-    parser.add_argument("--every", type=int, default=1, help="one of so many checks, by chance")
+    parser.add_argument("--every", type=int, default=1, help="one of so many, another draw for each")
     parser.add_argument("--most", type=int, default=5, help="most functions of tests for a check")
     parser.add_argument("--fuzz", type=float, help="seconds of fuzzing for each check, in place of tests")
     given, words = parser.parse_known_args()
@@ -153,7 +153,7 @@ def main() -> None:
     every = [(name, k) for name, text in texts.items() for k, _ in enumerate(checks(ast.parse(text)))]
     every = [one for one in every if one[0].startswith(given.only)]
     every = [one for one in every if not given.fuzz or f"{one[0]}#{one[1]}" in tests]
-    chosen, noticed = random.Random(1).sample(every, len(every) // given.every), 0
+    chosen, noticed = random.Random(given.every).sample(every, len(every) // given.every), 0
     for name, number in sorted(chosen):
         tree = ast.parse(texts[name])
         check = list(checks(tree))[number]

@@ -16,7 +16,10 @@ from run_files import write_small_run
 from stseg.arrays import AnyArray
 from stseg.commands.correct import correct
 from stseg.io.outputs.whole_files import replacing
+from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.pictures import encode_indexed
+from stseg.io.recording.rigs import read_recording
+from stseg.io.runfile.unfinished.work_folder import WorkFolder
 
 Maker = Callable[[Path], bytes]
 """Makes a valid file; the folder is one to work in."""
@@ -47,6 +50,15 @@ def npy(folder: Path) -> bytes:
 def npz(folder: Path) -> bytes:
     np.savez_compressed(folder / "p.npz", files=np.array([1], np.int64), times0_0=np.arange(9.0), P=_MATRIX)
     return (folder / "p.npz").read_bytes()
+
+
+def streams(folder: Path) -> bytes:
+    """The index of a recording that is being tracked."""
+    (folder / "rig.toml").write_bytes(text("rig.toml"))
+    (folder / "boxes.csv").write_bytes(text("boxes.csv"))
+    with WorkFolder(folder / "s.h5", {}) as work:
+        work.keep_streams(index_streams(read_recording(folder / "rig.toml")))
+        return (work.path / "streams.npz").read_bytes()
 
 
 def matlab_hdf5(folder: Path) -> bytes:

@@ -1,12 +1,17 @@
 """What a reader has accepted is within the stated limits, and the same once it is written and read again."""
 
+import csv
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 
 from stseg.arrays import Boxes, Floats, Rows
 from stseg.config import Config
+from stseg.errors import InputError, StsegError
 from stseg.geometry import Camera
 from stseg.io.answers import AnswerRow
 from stseg.io.calibrations.foreign_camera import ForeignCamera
@@ -16,20 +21,69 @@ from stseg.io.recording.recording import Recording, Source
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig
 from stseg.io.recording.streams import open_stream
+from stseg.io.runfile import layout
 from stseg.io.runfile.runs import Run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import is_name, is_title
+
+_LINE = 1000
+"""Characters of a refusal: values are shown in part."""
+_OTHER_FORMS = ("path", "ground", "vertical", "projection")
+_DEFAULTS: tuple[object, ...] = (False, 0, [])
 
 
-def require_boxes(frames: list[Boxes], camera: Camera, folder: Path) -> None:
-    """Boxes of the first frames."""
+def is_title(text: str) -> bool:
+    """Whether a text can be shown as a name; said here anew, so that no check of the program vouches for itself."""
+    return 0 < len(text) <= limits.NAME and text.isprintable() and text == text.strip()
+
+
+def is_name(text: str) -> bool:
+    """Whether a text can be a file's name, too."""
+    return is_title(text) and len(text.encode()) < 250 and text.strip(".") != "" and not {"/", "\\"} & set(text)
+
+
+def require_line(error: StsegError, folder: Path) -> None:
+    """A refusal: one short line that names the file, and what is wrong there in words of the format."""
+    line = str(error).replace(str(folder), "")
+    assert line.isprintable() and len(line) <= _LINE, line
+    assert isinstance(error, InputError) and error.expected, line
+    assert str(folder) in str(error) or folder == Path(), line
+    assert "a value of another type or size" not in line, line  # the net below the formats' own checks
+
+
+def require_table(path: Path) -> None:
+    """A table that was accepted, read as plainly as can be: no column twice, no row wider than the header."""
+    header, *rows = csv.reader(path.read_text("utf-8-sig").splitlines(), skipinitialspace=True)
+    if header[0][:1] in "-.0123456789":  # lines of MOTChallenge
+        assert all(float(row[0].split()[0]).is_integer() for row in rows if any(map(str.strip, row)))
+        return
+    names = [name.strip().lower() for name in header]
+    assert all(names.count(name) < 2 for name in names if name), names
+    assert not any(cell.strip() for row in rows for cell in row[len(names) :]), rows
+    if "frame" in names:
+        assert all(float(row[names.index("frame")] or 0).is_integer() for row in rows if any(map(str.strip, row))), rows
+
+
+def require_kept(given: Any, written: Any) -> None:
+    """Every value of a table stands in what was written of it, but for defaults and other forms of geometry."""
+    if isinstance(given, dict):
+        for key, value in given.items():
+            if key not in _OTHER_FORMS and (key in written or value not in _DEFAULTS):
+                require_kept(value, written[key])
+    elif isinstance(given, list) and isinstance(next(iter(given), 0), dict):
+        for one, other in zip(given, written, strict=True):
+            require_kept(one, other)
+    else:
+        np.testing.assert_array_equal(np.ravel(written)[: np.size(given)], np.ravel(given))
+
+
+def require_boxes(frames: list[Boxes], camera: Camera, folder: Path, most: float) -> None:
+    """Boxes of the first frames, of numbers up to a size."""
     lines = ["frame,left,top,width,height,score"]
     for frame, boxes in enumerate(frames):
         assert len(boxes) <= limits.BOXES_PER_FRAME
-        assert (np.abs(boxes.pixel) <= limits.NUMBER).all(), boxes.pixel
-        assert (boxes.pixel[:, 2:] >= 0).all(), boxes.pixel
-        assert ((boxes.score >= 0) & (boxes.score <= 1)).all(), boxes.score
+        assert (np.abs(boxes.pixel) <= most).all(), boxes.pixel
+        assert (boxes.pixel[:, 2:] >= 0).all() and ((boxes.score >= 0) & (boxes.score <= 1)).all(), boxes
         table = np.column_stack([boxes.pixel, boxes.score]).tolist()
         lines += [",".join([str(frame), *map(repr, row)]) for row in table]
     path = folder / "again.csv"
@@ -42,16 +96,20 @@ def require_boxes(frames: list[Boxes], camera: Camera, folder: Path) -> None:
         np.testing.assert_array_equal(again.score, boxes.score)
 
 
-def require_rig(recording: Recording) -> None:
-    """A rig and its sources."""
+def require_rig(recording: Recording, path: Path) -> None:
+    """A rig and its sources, as they were given."""
     grid = recording.rig.grid
     assert limits.FRAME_RATE[0] <= recording.rig.frame_rate <= limits.FRAME_RATE[1]
     assert limits.CELL[0] <= grid.cell <= limits.CELL[1]
     assert limits.TOP[0] <= grid.top <= limits.TOP[1] and grid.planes <= limits.PLANES
     assert np.abs([grid.x, grid.y]).max() <= limits.METRES and len(recording.rig.cameras) <= limits.CAMERAS
-    assert len({camera.name for camera in recording.rig.cameras}) == len(recording.rig.cameras)
+    names = [camera.name for camera in recording.rig.cameras]
+    assert len(set(names)) == len(names) and all(map(is_name, names))
+    assert all(0 < min(one.size) <= max(one.size) <= limits.SIDE for one in recording.rig.cameras)
+    assert grid.inside().any() and grid.x[0] < grid.x[1] and grid.y[0] < grid.y[1]
     text = format_rig(recording, recording.path)
     assert format_rig(parse_rig(text, recording.path), recording.path) == text
+    require_kept(tomllib.loads(path.read_text("utf-8-sig", "replace")), tomllib.loads(text))
 
 
 def require_numbers(most: float, *arrays: Floats) -> None:
@@ -60,17 +118,24 @@ def require_numbers(most: float, *arrays: Floats) -> None:
         assert (np.abs(array) <= most).all(), array
 
 
-def require_cameras(cameras: Sequence[ForeignCamera]) -> None:
-    """Cameras of a calibration."""
+def require_cameras(cameras: Sequence[ForeignCamera], path: Path) -> None:
+    """Cameras of a calibration; NumPy's own reader has the same numbers."""
+    assert 0 < len(cameras) <= limits.CAMERAS
+    if path.suffix in (".npy", ".npz"):
+        found = np.load(path, allow_pickle=False)
+        arrays = [found] if path.suffix == ".npy" else [found[name] for name in found.files]
+        assert any(np.array_equal(array, cameras[0].projection) for array in arrays)
     for camera in cameras:
         require_numbers(limits.NUMBER, camera.projection)
+        assert not camera.name or is_name(camera.name)
+        assert path.suffix != ".xml" or np.linalg.det(camera.projection[:, :3]) > 0  # no mirror
         assert camera.size is None or 0 < min(camera.size) <= max(camera.size) <= limits.SIDE
 
 
 def require_points(tables: Sequence[PointTable]) -> None:
     """Correspondences of points."""
-    assert sum(len(table.pixel) for table in tables) <= limits.POINTS
-    assert all(is_name(table.camera) for table in tables)
+    assert 0 < sum(len(table.pixel) for table in tables) <= limits.POINTS
+    assert all(is_name(table.camera) and len(table.pixel) for table in tables)
     require_numbers(limits.NUMBER, *(array for table in tables for array in (table.pixel, table.place)))
 
 
@@ -91,16 +156,23 @@ def require_answers(rows: Sequence[AnswerRow]) -> None:
 def require_run(run: Run) -> None:
     """Frames and tracks of a run."""
     rows = run.trajectory
+    with h5py.File(run.path) as file:
+        assert (file.attrs["format"], file.attrs["format_version"]) == (layout.FORMAT, layout.VERSION)
     assert (np.diff(run.frames) > 0).all() and len(np.unique(rows[["frame", "id"]])) == len(rows)
+    assert np.isin(rows["frame"], run.frames).all() and np.isfinite(rows["height"]).all()
+    assert len(run.cameras) == len(set(run.cameras)) and all(map(is_name, run.cameras))
+    known = dict(zip(*np.unique(rows["id"], return_counts=True), strict=True))
+    assert all(one["first"] <= one["last"] for one in run.tracks) and set(run.tracks["id"].tolist()) == set(known)
     require_numbers(limits.METRES, rows["x"], rows["y"])
     assert all(map(is_title, run.names.values()))
 
 
-def require_config(config: Config, folder: Path) -> None:
-    """Constants of all stages."""
-    path = folder / "again.toml"
+def require_config(config: Config, given: Path) -> None:
+    """Constants of all stages, as they were given."""
+    path = given.with_name("again.toml")
     path.write_text(as_toml(config), "utf-8")
     assert read_config(path) == config
+    require_kept(tomllib.loads(given.read_text("utf-8-sig")), tomllib.loads(path.read_text("utf-8")))
 
 
 def require_tracks(rows: Rows, folder: Path) -> None:

@@ -80,6 +80,7 @@ def _work(target: Target, first: int, until: float, stop: int, shared: mmap.mmap
     try:
         with tempfile.TemporaryDirectory() as name:
             valid = target.valid(Path(name))
+            _one(target, Path(name) / f"valid{target.suffix}", valid, is_valid=True)
             for seed in range(first, stop):
                 shared[:16] = struct.pack("<qd", seed, time.monotonic())
                 if time.monotonic() > until:
@@ -95,11 +96,12 @@ def _work(target: Target, first: int, until: float, stop: int, shared: mmap.mmap
     return 0
 
 
-def _one(target: Target, path: Path, data: bytes) -> None:
+def _one(target: Target, path: Path, data: bytes, *, is_valid: bool = False) -> None:
     path.write_bytes(data)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        answer(target, path)
+        found = answer(target, path)
+    assert not (is_valid and found), found
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     if held > MEBI:
         raise AssertionError(f"{held} MiB of memory")
