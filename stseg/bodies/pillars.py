@@ -81,7 +81,7 @@ class BodyTable(NamedTuple):
 
     def boxes_of(self, ground: Floats, heights: Floats) -> Floats:
         """Boxes of pillars with a height each, ground (n, 2) and heights (n,) in metres; float64 (n, 4), pixels."""
-        filled = np.full((len(ground), 4), np.nan)
+        filled = np.empty((len(ground), 4))
         place, tall = np.ascontiguousarray(ground, float), np.asarray(heights, float)
         _fill_boxes(self, place, tall, filled)
         return filled
@@ -128,8 +128,7 @@ def _fill_boxes(table: BodyTable, ground: Floats, heights: Floats, filled: Float
             visible = visible and not np.isnan(wide + tall)
             left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
             top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
-        if visible:
-            filled[i, 0], filled[i, 1], filled[i, 2], filled[i, 3] = left, top, right, bottom
+        filled[i] = (left, top, right, bottom) if visible else (np.nan, np.nan, np.nan, np.nan)
 
 
 def inside_bodies(grid: Grid, near_person: Ints, ground: Floats, height: Floats) -> Flags:

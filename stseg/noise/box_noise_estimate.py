@@ -110,17 +110,14 @@ def whole_boxes(edges: Floats, size: tuple[int, int]) -> Flags:
 
 def _squares(view: View, people: People, person: Ints, edges: Floats) -> Floats:
     """Expected squared offsets of people's boxes, float64 (box, 5)."""
-    count, total = len(person), np.zeros((len(person), len(TOLERANCE)))
+    count, offsets = len(_POINTS), np.empty((len(_POINTS) * len(person), 4))
     root = np.linalg.cholesky(people.covariance[person])
     tall = np.sqrt(people.sizes.height_variance[person])
-    width, height = map(float, view.camera.size)
-    for point in _POINTS:
-        ground = people.ground[person] + root @ point[:2]
-        bodies = view.table.boxes_of(ground, people.sizes.height[person] + tall * point[2])
-        offsets = np.empty((count, 4))
-        fill_offsets(bodies, edges, width, height, offsets)
-        squares = np.nan_to_num(offsets**2)
-        total[:, :LOWER_EDGE_BELOW] += squares[:, :LOWER_EDGE_BELOW]
-        total[:, LOWER_EDGE_BELOW] += np.where(offsets[:, LOWER_EDGE_BELOW] <= 0, squares[:, LOWER_EDGE_BELOW], 0)
-        total[:, LOWER_EDGE_ABOVE] += np.where(offsets[:, LOWER_EDGE_BELOW] > 0, squares[:, LOWER_EDGE_BELOW], 0)
-    return total / len(_POINTS)
+    ground = people.ground[person] + (root @ _POINTS[:, None, :2, None])[..., 0]
+    heights = people.sizes.height[person] + tall * _POINTS[:, 2:]
+    bodies = view.table.boxes_of(ground.reshape(-1, 2), heights.ravel())
+    fill_offsets(bodies, np.tile(edges, (count, 1)), *map(float, view.camera.size), offsets)
+    is_below, squares = offsets[:, LOWER_EDGE_BELOW:] <= 0, np.nan_to_num(offsets**2)
+    lower = squares[:, LOWER_EDGE_BELOW:]
+    split = np.column_stack([squares[:, :LOWER_EDGE_BELOW], np.where(is_below, lower, 0), np.where(is_below, 0, lower)])
+    return np.asarray(split.reshape(count, len(person), len(TOLERANCE)).sum(0) / count)
