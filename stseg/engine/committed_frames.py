@@ -91,7 +91,7 @@ class CommittedFrames:
         return CommittedFrames(
             Commit(
                 commit.frames[begin:end],
-                commit.label[begin:end],
+                commit.labels[begin:end],
                 commit.trajectory[_inside(commit.trajectory["frame"], first, stop)],
                 commit.events[_inside(commit.events["frame"], first, stop)],
                 commit.windows[_inside(commit.windows["commit_stop"] - 1, first, stop)],
@@ -177,10 +177,9 @@ def within_area(commit: Commit, rig: Rig) -> Commit:
     inside = rig.grid.contains(np.stack([rows["x"], rows["y"]], -1))
     if rig.closed or inside.all():
         return commit
-    label, outside = commit.label.copy(), rows[~inside]
-    for fused, cells in zip(commit.frames, label, strict=True):
-        cells[np.isin(cells, outside["id"][outside["frame"] == fused.frame])] = 0
-    return replace(commit, label=label, trajectory=rows[inside])
+    outside, pairs = rows[~inside], zip(commit.frames, commit.labels, strict=True)
+    labels = [cells.without(outside["id"][outside["frame"] == fused.frame]) for fused, cells in pairs]
+    return replace(commit, labels=labels, trajectory=rows[inside])
 
 
 @dataclass

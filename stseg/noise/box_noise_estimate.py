@@ -116,7 +116,8 @@ def _squares(view: View, people: People, person: Ints, edges: Floats) -> Floats:
     ground = people.ground[person] + (root @ _POINTS[:, None, :2, None])[..., 0]
     heights = people.sizes.height[person] + tall * _POINTS[:, 2:]
     bodies = view.table.boxes_of(ground.reshape(-1, 2), heights.ravel())
-    fill_offsets(bodies, np.tile(edges, (count, 1)), *map(float, view.camera.size), offsets)
+    width, height = map(float, view.camera.size)
+    fill_offsets(bodies, np.tile(edges, (count, 1)), width, height, offsets)
     is_below, squares = offsets[:, LOWER_EDGE_BELOW:] <= 0, np.nan_to_num(offsets**2)
     lower = squares[:, LOWER_EDGE_BELOW:]
     split = np.column_stack([squares[:, :LOWER_EDGE_BELOW], np.where(is_below, lower, 0), np.where(is_below, 0, lower)])

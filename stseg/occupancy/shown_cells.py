@@ -137,6 +137,7 @@ class CellTables:
         self.in_volume, place = order[is_seen].astype(np.int32), np.flatnonzero(is_seen) % len(self.ground)
         self.footprint, self.place = views.take(self.in_volume, 1), place.astype(np.int32)
         self._width = np.add.reduceat(is_seen, start, dtype=np.int64)  # cells of each block
+        self._first = (self._width.cumsum() - self._width).astype(np.int32)
         self._cells: _MarkedCells | None = None
 
     @cached_property
@@ -181,9 +182,10 @@ class CellTables:
         return ShownCells(cell, place, in_volume, block, start, unseen, person, number)
 
     def _cells_of(self, marked: Flags) -> _MarkedCells:
-        cell = np.flatnonzero(np.repeat(marked, self._width)).astype(np.int32)
         block = np.flatnonzero(marked & (self._width > 0)).astype(np.int32)
         start = np.append(0, self._width[block].cumsum()).astype(np.int32)
+        before = self._first[block] - start[:-1]
+        cell = np.arange(start[-1], dtype=np.int32) + np.repeat(before, self._width[block])
         sets, of_cell = self.sets, self.sets.of_cell[cell]
         others = sets.size - np.bincount(of_cell, minlength=len(sets.size))
         seen_by = np.concatenate([sets.seen_by[of_cell], sets.seen_by])

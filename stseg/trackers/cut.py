@@ -22,6 +22,7 @@ from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.solvers import SOLVERS, find_solver
 from stseg.records.blobs import Blobs
 from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.sparse_labels import SparseLabels
 from stseg.records.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_labelling import WindowDetections, WindowLabels, label_cells
@@ -195,15 +196,15 @@ class CutTracker:
         row: Rows,
     ) -> Commit:
         kept = range(window.commit_first - frames[0].fused.frame, window.commit_stop - frames[0].fused.frame)
-        named = np.zeros((len(kept), *self.rig.grid.shape), np.int32)
-        rows = []
-        for k, cells in zip(kept, named, strict=True):
-            identity = np.append(0, decision.identity[k])
+        shape, labels, rows = self.rig.grid.shape, [], []
+        for k in kept:
+            identity = np.append(0, decision.identity[k]).astype(np.int32)
             plane, sheet = np.divmod(np.flatnonzero(label[k]), patches.place.size)
             place = patches.place.reshape(-1)[sheet]
-            cells.reshape(len(cells), -1)[plane, place] = identity[blobs[k].cells.reshape(-1)[place]]
+            cell = plane * (shape[1] * shape[2]) + place
+            labels.append(SparseLabels(shape, cell, identity[blobs[k].cells.reshape(-1)[place]]))
             rows.append(self._rows(frames[k].fused, blobs[k], decision.identity[k]))
-        return Commit([frames[k].fused for k in kept], named, np.concatenate(rows), event_rows(decision.events), row)
+        return Commit([frames[k].fused for k in kept], labels, np.concatenate(rows), event_rows(decision.events), row)
 
     def _rows(self, fused: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:
         """TRAJECTORY rows of the detections that the blobs of identities hold."""

@@ -11,6 +11,7 @@ from stseg.config import Config
 from stseg.geometry import Grid, Rig
 from stseg.geometry.nearest_person import nearest_person
 from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.sparse_labels import SparseLabels
 from stseg.records.tables import WINDOW
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces, event_rows, trajectory_rows, views_at
@@ -32,7 +33,7 @@ class FramewiseTracker:
         grid, reach = self.rig.grid, self.config.occupancy.person_radius
         label, extent = _reached_cells(fused, tracks.ground, tracks.ids, grid, reach)
         rows = trajectory_rows(fused.frame, tracks, extent, views_at(self.rig, tracks.ground))
-        return Commit([fused], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
+        return Commit([fused], [SparseLabels.whole(label)], rows, event_rows(events), np.zeros(0, WINDOW))
 
 
 class FrameTracker(FramewiseTracker):

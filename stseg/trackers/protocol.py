@@ -6,11 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+import numpy as np
+
 from stseg.arrays import Labels, Observation, Rows, Singles, ViewEvidence
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.records.people import People
 from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.sparse_labels import SparseLabels
 from stseg.records.sparse_volume import SparseVolume
 
 
@@ -54,14 +57,19 @@ class Commit:
 
     frames: list[FusedFrame]
     """Frames in order."""
-    label: Labels
-    """int32 (time, plane, y, x): track ids, 0 for background."""
+    labels: Sequence[SparseLabels]
+    """Track ids of each frame's cells."""
     trajectory: Rows
     """Rows of `stseg.records.tables`, TRAJECTORY."""
     events: Rows
     """Rows of EVENT."""
     windows: Rows
     """Rows of WINDOW."""
+
+    @property
+    def label(self) -> Labels:
+        """int32 (time, plane, y, x): track ids, 0 for background."""
+        return np.stack([one.dense() for one in self.labels])
 
 
 class TrackingMethod(Protocol):

@@ -24,6 +24,7 @@ from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Grid, Rig
 from stseg.io.recording.frames import FrameSet
 from stseg.records.blobs import Blobs
+from stseg.records.sparse_labels import SparseLabels
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, WINDOW
 from stseg.simulation import NAMED, Route, SceneFilm, SceneSpec
@@ -224,7 +225,7 @@ def commit_of(rig: Rig) -> Commit:
     label[:, 0, 0, : len(PLACES)] = np.arange(1, len(PLACES) + 1)
     nobody, empty = found(people()), SparseVolume.whole(np.zeros(rig.grid.shape, np.float32))
     frames = [FusedFrame(frame, nobody, nobody, empty) for frame in (FIRST, FIRST + 1)]
-    return Commit(frames, label, rows, np.zeros(0, EVENT), np.zeros(0, WINDOW))
+    return Commit(frames, [SparseLabels.whole(one) for one in label], rows, np.zeros(0, EVENT), np.zeros(0, WINDOW))
 
 
 @pytest.mark.parametrize(

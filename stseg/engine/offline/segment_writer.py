@@ -135,7 +135,7 @@ def _packed_volumes(job: Job, step: CommittedFrames) -> _Volumes:
 
 def _volume(job: Job, step: CommittedFrames, k: int) -> tuple[Singles, Labels]:
     """Log-odds and labels (plane, y, x) of a frame as far as the job keeps the volume; nan and 0 elsewhere."""
-    label, scene = step.commit.label[k], step.commit.frames[k]
+    label, scene = step.commit.labels[k].dense(), step.commit.frames[k]
     if job.volume == "none":
         return np.full(label.shape, np.nan, np.float32), np.zeros_like(label)
     log_odds = scene.log_odds
