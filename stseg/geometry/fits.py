@@ -33,7 +33,8 @@ def fit_homography(ground: Floats, pixel: Floats) -> Floats:
     zero = np.zeros_like(x)
     along_u = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y, -u], -1)
     along_v = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y, -v], -1)
-    unit = np.linalg.svd(np.concatenate([along_u, along_v]))[2][-1].reshape(3, 3)
+    rows = np.concatenate([along_u, along_v, np.zeros((1, 9))])  # with four points, 0 is the ninth singular value
+    unit = np.linalg.svd(rows, full_matrices=False)[2][-1].reshape(3, 3)
     homography = np.linalg.inv(unit_pixel) @ unit @ unit_ground
     sign = 1.0 if np.median(homogeneous(ground) @ homography[2]) > 0 else -1.0
     return np.asarray(homography * sign / np.linalg.norm(homography[2]))

@@ -30,8 +30,8 @@ MOTION = np.dtype(
 squared along the heading. nan where a track has fewer than three rows nearby."""
 _STANDING = 0.2
 _ERRORS_LAST = 0.5
-"""Time in which the correlation of errors of places falls by e, seconds: of stated deviations of velocity, 62 to 82 %
-then hold the truth's in three recordings, of acceleration 65 to 90 % (asked: 68)."""
+"""Time in which the correlation of errors of smoothed places falls by e, seconds: in three recordings 62 to 82 % of the
+true velocities, and 65 to 90 % of the accelerations, are then within the stated deviation."""
 _ANY_HEADING = np.pi / 3**0.5
 """Standard deviation of a heading of which nothing is known, radians."""
 

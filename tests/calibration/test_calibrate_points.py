@@ -17,6 +17,7 @@ from stseg import errors
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_fit import PointFit, fit_points
+from stseg.calibration.points.point_requirements import require_plane
 from stseg.commands.calibrate.app import app
 from stseg.commands.calibrate.lens import calibrate_lens
 from stseg.errors import CalibrationError, ConfigError
@@ -104,6 +105,14 @@ class TestFit:
     def test_a_lens_is_named_where_few_points_hide_it(self) -> None:
         points = points_of(camera(distortion=BARREL), 1.6 * SPREAD, None)
         assert any("the lens bends" in word for word in fit_warnings(fit_points("cam", SIZE, points), GRID))
+
+    def test_memory_goes_with_the_number_of_points(self) -> None:
+        ground, view = np.random.default_rng(1).uniform(-2, 2, (20_000, 2)), camera()
+        pixel = view.project(ground, 0.0)[0]
+        require_plane("cam", ground, pixel)
+        np.testing.assert_allclose(
+            fit_homography(ground, pixel), view.ground / np.linalg.norm(view.ground[2]), atol=1e-6
+        )
 
     @pytest.mark.parametrize("seed", range(6))
     def test_errors_of_clicks_stay_what_they_are(self, seed: int) -> None:

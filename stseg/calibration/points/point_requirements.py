@@ -43,8 +43,12 @@ def require_unmirrored(camera: Camera, projection: Floats) -> None:
 
 
 def all_but_one_on_line(points: Floats) -> bool:
-    """Whether leaving out one point leaves a line."""
-    return any(_on_line(np.delete(points, k, axis=0)) for k in range(len(points)))
+    """Whether leaving out one point leaves a line, by the scatter of the others about their mean."""
+    off, number = points - points.mean(axis=0), len(points)
+    product = off[:, :, None] * off[:, None]
+    scatter = product.sum(axis=0) - number / (number - 1) * product
+    square = np.linalg.eigvalsh(scatter)
+    return bool((square[:, -2] <= _COLLINEAR_RATIO**2 * square[:, -1]).any())
 
 
 def _on_line(points: Floats) -> bool:
