@@ -1,4 +1,4 @@
-"""Memory of a process of a run, estimated from the rig before any work, and compared with what the machine has.
+"""Memory and time that a ground takes, estimated from the rig before any work; memory is compared with the machine's.
 
 Measured: a ground of 20 m x 20 m and 7 views, 0.9 GiB; 40 m x 40 m, 3.8 GiB; tables of 100 m x 100 m, cells of 2 m and
 2 views, 0.5 GiB of boxes and 0.7 GiB of pixels.
@@ -22,6 +22,11 @@ _TABLE_POINT, _TABLE_STEP = 100, 0.12
 _PILLAR = 160
 """Bytes of each pillar of the birth lattice in a view: its box, its outline, its place in indices."""
 
+_TABLE_SECONDS = 3e-4
+"""Time in which the tables of a square metre are made for a view, seconds, about: tables of 100 m x 100 m, 3 s."""
+_LONG_TABLES = 10.0
+"""Time from which on they are announced, seconds."""
+
 
 def process_memory(rig: Rig, config: Config) -> int:
     """Bytes that a process of a run is taken to need."""
@@ -41,6 +46,14 @@ def require_memory(rig: Rig, config: Config, path: Path | str) -> None:
     x, y = (high - low for low, high in (rig.grid.x, rig.grid.y))
     remedy = "a smaller ground (are these centimetres?), or a larger detection.lattice_spacing"
     raise ConfigError(path, "scene.x, scene.y", f"{x:g} m x {y:g} m, which take {takes}", f"{fits}: {remedy}")
+
+
+def ground_note(rig: Rig) -> str:
+    """A line on the time before the first frame, where a large ground makes it long; else nothing."""
+    x, y = (high - low for low, high in (rig.grid.x, rig.grid.y))
+    seconds = len(rig.cameras) * x * y * _TABLE_SECONDS
+    ground = f"tables of a ground of {x:g} m x {y:g} m in {len(rig.cameras)} views"
+    return f"{ground}: about {seconds:.0f} s of work (is it in centimetres?)" if seconds > _LONG_TABLES else ""
 
 
 def _of_cells(rig: Rig) -> int:

@@ -11,7 +11,7 @@ from tempfile import mkdtemp
 
 from stseg.config import Config
 from stseg.config.keys import require_effect
-from stseg.engine.memory import require_memory
+from stseg.engine.memory import ground_note, require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.detector_sources import with_boxes
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
@@ -153,6 +153,8 @@ def track_recording(
     config = with_body_of(recording, config)
     if workforce.scheduler is None:
         require_memory(recording.rig, config, recording.path)
+        if note := ground_note(recording.rig):
+            reporter.note(note)
     # Refused before people are searched in videos.
     WorkFolder(output, {}).require_output(overwrite, Inputs(recording_files(recording), [known]))
     recording = with_boxes(recording, output.with_name(f"{output.name}.boxes"), reporter, overwrite)

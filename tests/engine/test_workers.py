@@ -23,7 +23,7 @@ from scenes import corner_cameras, rig_of
 
 import stseg
 from stseg.config import Config
-from stseg.engine.memory import process_memory
+from stseg.engine.memory import ground_note, process_memory
 from stseg.engine.workers import worker_processes
 from stseg.engine.workers.worker_processes import processes_that_fit
 from stseg.engine.workers.workforce import Workforce
@@ -165,6 +165,7 @@ def test_a_large_ground_leaves_room_for_fewer(ground_side: int, views: int, proc
     grid = Grid((0.0, ground_side), (0.0, ground_side))
     rig = replace(rig_of(corner_cameras()[:1] * views), grid=grid)
     assert processes_that_fit(process_memory(rig, Config())) == processes
+    assert ("in 8 views: about 384 s" in ground_note(rig)) == bool(ground_note(rig)) == (ground_side == 400)
 
 
 @cases()
