@@ -223,7 +223,7 @@ def _names(path: Path) -> None:
 
 def _points(path: Path) -> None:
     oracles.require_points(tables := read_points(path))
-    for table in (one for one in tables if len(one.pixel) < 5_000):  # more take longer than a file may here
+    for table in (one for one in tables if len(one.pixel) < 1_000):  # more take longer than a file may here
         fit_points(table.camera, SIZE, Points(table.pixel, table.place[:, :2], table.place[:, 2]), None)
 
 
