@@ -188,7 +188,8 @@ def _require_command(tokens: Sequence[str]) -> None:
 
 def _require_file_names(tokens: Sequence[str]) -> None:
     """Refuse the name of a folder for an output that is a file: paths drop the slash at its end."""
-    for option, value in pairwise(tokens):
+    words = [word for token in tokens for word in token.split("=", 1)]
+    for option, value in pairwise(words):
         if option in _FILES and value.endswith(os.sep) and tokens[0] not in _WRITERS_OF_FOLDERS:
             raise ConfigError("command line", option, f"the name of a folder, {value!r}", "the name of a file")
 

@@ -61,8 +61,8 @@ def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytes
     monkeypatch.setattr("stseg.commands.inspect.read_run", interrupted)
     assert main(["inspect", "x.h5"]) == 130
     assert capsys.readouterr().err == "stseg: interrupted\n"
-    monkeypatch.setattr("stseg.io.recording.rigs.read_recording", interrupted)
-    assert main(["run", "x.toml", "-o", "x.h5", "--scheduler", "x"]) == 130
+    monkeypatch.setattr("stseg.commands.run.prepare_workers", interrupted)
+    assert main(["run", "x.toml", "-o", "x.h5"]) == 130
     assert capsys.readouterr().err.startswith("stseg: interrupted; the same command goes on after the last finished")
 
 
