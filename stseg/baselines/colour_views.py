@@ -42,9 +42,11 @@ def colour_views(observed: FrameObservations, tracker: str, frame: int) -> list[
     observations = [observation for observation in observed.observations if observation is not None]
     if observations and not any(_is_colour(observation) for observation in observations):
         raise SourceError(
-            f"--tracker {tracker}", f"frame {frame}", f"{_kinds(observations)} and no colour",
+            f"--tracker {tracker}",
+            f"frame {frame}",
+            f"{_kinds(observations)} and no colour",
             "a camera that delivers colour images: this tracker knows people by their clothes",
-        )  # fmt: skip
+        )
     return views
 
 

@@ -81,7 +81,7 @@ def histograms(image: Bytes, boxes: Floats, nearer: Floats) -> tuple[Floats, Flo
 @kernel
 def fill_histograms(
     image: Bytes, bins: Bytes, boxes: Floats, nearer: Floats, points: Floats, colours: Floats, share: Floats
-) -> None:  # fmt: skip
+) -> None:
     """Fill colours (n, part, bin), which are zero, and share (n, part); see `histograms`."""
     rows, columns = image.shape[:2]
     parts = colours.shape[1]

@@ -148,9 +148,7 @@ def _gaussian(covariance: Floats) -> tuple[Floats, float]:
 
 
 @kernel
-def fill_mixture(
-    place: Floats, centre: Floats, weight: Floats, inverse: Floats, scale: float, filled: Floats
-) -> None:  # fmt: skip
+def fill_mixture(place: Floats, centre: Floats, weight: Floats, inverse: Floats, scale: float, filled: Floats) -> None:
     """Fill (k,) with the density at places (k, 2) of Gaussians of one covariance at centres (n, 2)."""
     for i in range(len(place)):
         total = 0.0
@@ -161,9 +159,7 @@ def fill_mixture(
 
 
 @kernel
-def fill_origin(
-    place: Floats, centre: Floats, weight: Floats, inverse: Floats, uniform: Floats, origin: Ints
-) -> None:  # fmt: skip
+def fill_origin(place: Floats, centre: Floats, weight: Floats, inverse: Floats, uniform: Floats, origin: Ints) -> None:
     """Fill (k,) with one Gaussian each, drawn by its density at the place with random numbers (k,).
 
     The exponents are taken relative to the least, so that places far from all Gaussians select the nearest.

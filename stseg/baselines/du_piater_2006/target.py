@@ -48,9 +48,16 @@ class Target:
 
     @classmethod
     def at(
-        cls, track: int, ground: Floats, covariance: Floats, height: float, views: int, count: int,
-        speed_spread: float, rng: np.random.Generator,
-    ) -> Target:  # fmt: skip
+        cls,
+        track: int,
+        ground: Floats,
+        covariance: Floats,
+        height: float,
+        views: int,
+        count: int,
+        speed_spread: float,
+        rng: np.random.Generator,
+    ) -> Target:
         """A birth at a place (2,) with a covariance (2, 2), any velocity, and no colour model."""
         place = rng.multivariate_normal(ground, covariance, count, method="cholesky")
         velocity = speed_spread * rng.standard_normal((count, 2))
@@ -62,9 +69,13 @@ class Target:
         return Prediction.of(self.star.ground, np.eye(2), motion)
 
     def learn(
-        self, views: Sequence[StarView], images: Sequence[Bytes | None], ground: Floats, nearer: Sequence[Floats],
+        self,
+        views: Sequence[StarView],
+        images: Sequence[Bytes | None],
+        ground: Floats,
+        nearer: Sequence[Floats],
         share: float,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Update the colour models at a known place (2,), from views with full visibility.
 
         `nearer` are, for each view, boxes of people in front of the target; `share` is the learning rate.

@@ -98,9 +98,18 @@ class DetectionProbability:
         fill_summed_area(soft_map, 0, 0, sums)
         chance = np.empty(len(pillars.edge))
         fill_chance(
-            sums, pillars.upright, pillars.edge, pillars.middle, pillars.half, pillars.base, self.widths,
-            self.height_share, self.width_share, self.config.unseen_rate, chance,
-        )  # fmt: skip
+            sums,
+            pillars.upright,
+            pillars.edge,
+            pillars.middle,
+            pillars.half,
+            pillars.base,
+            self.widths,
+            self.height_share,
+            self.width_share,
+            self.config.unseen_rate,
+            chance,
+        )
         return chance
 
     def view_log_ratio(self, chance: Floats) -> Floats:

@@ -135,9 +135,17 @@ def empty_explanation(rig: Rig, evidence: Sequence[ViewEvidence]) -> Explanation
     """The explanation of a frame without people: every pixel and every box is unassigned."""
     none, views = np.zeros(0), len(evidence)
     people = People(
-        np.zeros((0, 2)), none, none, np.zeros((0, 2, 2)), none, np.zeros((views, 0)), np.zeros((views, 0)), none,
-        np.zeros(0, np.int64), Sizes(none, none, none, none),
-    )  # fmt: skip
+        np.zeros((0, 2)),
+        none,
+        none,
+        np.zeros((0, 2, 2)),
+        none,
+        np.zeros((views, 0)),
+        np.zeros((views, 0)),
+        none,
+        np.zeros(0, np.int64),
+        Sizes(none, none, none, none),
+    )
     # One raster pixel for the whole image, unassigned.
     steps = tuple(max(camera.size) for camera in rig.cameras)
     owner = tuple(np.full((1, 1), -1, np.int16) for _ in steps)

@@ -29,9 +29,18 @@ HYPOTHESIS_WEIGHT = 0.15
 
 @kernel
 def fill_axes(
-    bodies: Floats, boxes: Ints, ideal: Singles, canvas: Canvas, step: float, widths: float,
-    ground: Floats, vertical: Floats, median: bool, distances: Floats, axes: Floats,
-) -> None:  # fmt: skip
+    bodies: Floats,
+    boxes: Ints,
+    ideal: Singles,
+    canvas: Canvas,
+    step: float,
+    widths: float,
+    ground: Floats,
+    vertical: Floats,
+    median: bool,
+    distances: Floats,
+    axes: Floats,
+) -> None:
     """The axes of all people in a view.
 
     Parameters

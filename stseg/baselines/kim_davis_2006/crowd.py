@@ -55,9 +55,14 @@ class Crowd:
         """The chosen people, bool (n,)."""
         appearances = tuple(one for one, stays in zip(self.appearances, which, strict=True) if stays)
         return Crowd(
-            self.ids[which], self.last_detection[which], self.height[which], self.ground[which], self.covariance[which],
-            self.particles[:, which], appearances,
-        )  # fmt: skip
+            self.ids[which],
+            self.last_detection[which],
+            self.height[which],
+            self.ground[which],
+            self.covariance[which],
+            self.particles[:, which],
+            appearances,
+        )
 
     def joined_with(self, others: Crowd) -> Crowd:
         """These, then others, concatenated."""

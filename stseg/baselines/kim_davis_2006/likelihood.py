@@ -22,9 +22,19 @@ NEUTRAL = 0.25
 
 @kernel
 def add_misfit(
-    bodies: Floats, order: Ints, boxes: Ints, ideal: Singles, bins: Labels, reference: Floats, areas: Floats,
-    half_width: Floats, parts: Floats, free: Singles, counts: Floats, misfit: Floats,
-) -> None:  # fmt: skip
+    bodies: Floats,
+    order: Ints,
+    boxes: Ints,
+    ideal: Singles,
+    bins: Labels,
+    reference: Floats,
+    areas: Floats,
+    half_width: Floats,
+    parts: Floats,
+    free: Singles,
+    counts: Floats,
+    misfit: Floats,
+) -> None:
     """Add each person's sum over the parts of d^2 in one view to misfit float64 (n,).
 
     Parameters

@@ -55,9 +55,16 @@ def clear(boxes: Ints, canvas: Canvas) -> None:
 
 @kernel
 def segment(
-    bodies: Floats, order: Ints, boxes: Ints, ideal: Singles, foreground: Bytes, density: Singles,
-    half_width: Floats, parts: Floats, canvas: Canvas,
-) -> None:  # fmt: skip
+    bodies: Floats,
+    order: Ints,
+    boxes: Ints,
+    ideal: Singles,
+    foreground: Bytes,
+    density: Singles,
+    half_width: Floats,
+    parts: Floats,
+    canvas: Canvas,
+) -> None:
     """Label a view's foreground.
 
     Parameters
@@ -96,9 +103,16 @@ def segment(
 
 @kernel
 def fill_unoccluded(
-    bodies: Floats, order: Ints, boxes: Ints, ideal: Singles, half_width: Floats, parts: Floats,
-    free: Singles, owner: Labels, unoccluded: Ints,
-) -> None:  # fmt: skip
+    bodies: Floats,
+    order: Ints,
+    boxes: Ints,
+    ideal: Singles,
+    half_width: Floats,
+    parts: Floats,
+    free: Singles,
+    owner: Labels,
+    unoccluded: Ints,
+) -> None:
     """Mark the unoccluded pixels of people, from which colour models may be learned.
 
     Parameters

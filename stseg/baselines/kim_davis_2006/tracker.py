@@ -175,10 +175,15 @@ class ParticleTracker(FramewiseTracker):
         unknown = (PersonAppearance.unknown(),) * count
         self.crowd = self.crowd.joined_with(
             Crowd(
-                ids, np.full(count, fused.frame), people.height[unassigned], places, people.covariance[unassigned],
-                particles, unknown,
+                ids,
+                np.full(count, fused.frame),
+                people.height[unassigned],
+                places,
+                people.covariance[unassigned],
+                particles,
+                unknown,
             )
-        )  # fmt: skip
+        )
         return [(fused.frame, "birth", int(i), 0, "found where nobody was followed") for i in ids]
 
     def _end(self) -> list[Event]:

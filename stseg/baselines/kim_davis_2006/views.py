@@ -102,9 +102,7 @@ class ParticleFrame:
         """Label the view's canvas by a hypothesis (n, 2); the bodies, and their order of occlusion."""
         view, bodies = self.view, self.view.bodies(ground, self.height)
         order = np.argsort(bodies[:, 4], kind="stable")
-        segment(
-            bodies, order, self.boxes, view.ideal, self.foreground, self.density, HALF_WIDTH, PARTS, view.canvas
-        )  # fmt: skip
+        segment(bodies, order, self.boxes, view.ideal, self.foreground, self.density, HALF_WIDTH, PARTS, view.canvas)
         return bodies, order
 
     def fill_axes(self, ground: Floats, median: bool, axes: Floats) -> None:
@@ -112,9 +110,18 @@ class ParticleFrame:
         view, (bodies, _) = self.view, self.segment(ground)
         camera = view.camera
         fill_axes(
-            bodies, self.boxes, view.ideal, view.canvas, float(view.step), _WIDTHS, camera.ground, camera.vertical,
-            median, view.distance_buffer, axes,
-        )  # fmt: skip
+            bodies,
+            self.boxes,
+            view.ideal,
+            view.canvas,
+            float(view.step),
+            _WIDTHS,
+            camera.ground,
+            camera.vertical,
+            median,
+            view.distance_buffer,
+            axes,
+        )
 
     def add_misfit(self, ground: Floats, reference: Floats, misfit: Floats) -> None:
         """Add the colour misfit of each person at (n, 2), given q* (n, part, bin), to misfit (n,)."""
@@ -122,9 +129,19 @@ class ParticleFrame:
         order = np.argsort(bodies[:, 4], kind="stable")
         counts = np.zeros(reference.shape[1:])
         add_misfit(
-            bodies, order, self.boxes, view.ideal, self.bins, reference, view.areas, HALF_WIDTH, PARTS,
-            view.canvas.free, counts, misfit,
-        )  # fmt: skip
+            bodies,
+            order,
+            self.boxes,
+            view.ideal,
+            self.bins,
+            reference,
+            view.areas,
+            HALF_WIDTH,
+            PARTS,
+            view.canvas.free,
+            counts,
+            misfit,
+        )
 
     def learned(
         self, ground: Floats, appearances: Sequence[PersonAppearance], share: float, rng: np.random.Generator
