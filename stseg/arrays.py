@@ -26,6 +26,11 @@ Rows = NDArray[np.void]
 AnyArray = NDArray[Any]
 
 
+def columns(text: str) -> np.dtype[np.void]:
+    """Dtype of rows with such columns as in `"frame:<i8 score:<f4"`."""
+    return np.dtype([(name, kind) for name, kind in (column.split(":") for column in text.split())])
+
+
 @dataclass(frozen=True, slots=True)
 class Boxes:
     """A detector's boxes in one view of one frame.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit, ndtr
 
-from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.arrays import Flags, Floats, Ints, Rows, columns
 from stseg.geometry.grid import inside_polygon
 
 
@@ -68,16 +68,10 @@ class Areas:
     lines: tuple[Line, ...] = ()
 
 
-COUNT = np.dtype(
-    [("frame", "<i8"), ("time", "<f8"), ("zone", "O"), ("people", "<i8"), ("expected", "<f8"), ("deviation", "<f8"),
-     ("density", "<f8")]
-)  # fmt: skip
+COUNT = columns("frame:<i8 time:<f8 zone:O people:<i8 expected:<f8 deviation:<f8 density:<f8")
 """One row per zone and frame: number of tracks; its mean and standard deviation by the tracks' scores and the errors of
 their places, and by people missed or made up; people a square metre."""
-VISIT = np.dtype(
-    [("zone", "O"), ("id", "<i8"), ("first", "<i8"), ("last", "<i8"), ("start", "<f8"), ("dwell", "<f8"),
-     ("entered", "?"), ("left", "?")]
-)  # fmt: skip
+VISIT = columns("zone:O id:<i8 first:<i8 last:<i8 start:<f8 dwell:<f8 entered:? left:?")
 """One row per stay of a track in a zone: frames, seconds; whether the track was seen outside before and after."""
 SYSTEMATIC_SHARE = 0.05
 """Standard deviation of a count by systematic errors, people missed or made up and shifted cameras: share of it."""
@@ -149,10 +143,7 @@ def _spells(inside: Flags, frame: Ints, patience: int) -> tuple[Ints, Ints]:
     return starts, stops
 
 
-CROSSING = np.dtype(
-    [("line", "O"), ("frame", "<i8"), ("time", "<f8"), ("id", "<i8"), ("to", "O"), ("x", "<f8"), ("y", "<f8"),
-     ("speed", "<f8")]
-)  # fmt: skip
+CROSSING = columns("line:O frame:<i8 time:<f8 id:<i8 to:O x:<f8 y:<f8 speed:<f8")
 """One row per crossing: seconds, the side that is reached as seen along the line, place in metres, metres a second."""
 
 

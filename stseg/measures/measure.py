@@ -7,18 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Ints, Rows
+from stseg.arrays import Ints, Rows, columns
 from stseg.geometry import Grid
 from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, standard_error, zone_counts, zone_visits
 from stseg.measures.motion import flow_field, motions, spacings, track_measures
 
-ZONE = np.dtype(
-    [("zone", "O"), ("area", "<f8"), ("mean_people", "<f8"), ("deviation", "<f8"), ("most_people", "<i8"),
-     ("entries", "<i8"), ("exits", "<i8"), ("visits", "<i8"), ("mean_dwell", "<f8"), ("median_dwell", "<f8"),
-     ("mean_density", "<f8")]
-)  # fmt: skip
+ZONE = columns(
+    "zone:O area:<f8 mean_people:<f8 deviation:<f8 most_people:<i8 entries:<i8 exits:<i8 visits:<i8 "
+    "mean_dwell:<f8 median_dwell:<f8 mean_density:<f8"
+)
 """One row per zone: square metres, people, standard deviation of their mean, seconds, people a square metre."""
-LINE = np.dtype([("line", "O"), ("left", "<i8"), ("right", "<i8"), ("per_minute", "<f8"), ("mean_speed", "<f8")])
+LINE = columns("line:O left:<i8 right:<i8 per_minute:<f8 mean_speed:<f8")
 """One row per line: crossings to each side, crossings a minute, metres a second."""
 
 
@@ -81,11 +80,7 @@ def measure_tracks(
     shapes = zip(areas.zones, people, visits, strict=True)
     zones = [_zone(z.name, z.area, count, stays, standard_error(count, frame_rate)) for z, count, stays in shapes]
     minutes = max(len(frames) / frame_rate / 60, 1e-9)
-    lines = [
-        (line.name, (crossed["to"] == "left").sum(), (crossed["to"] == "right").sum(), len(crossed) / minutes,
-         _of(crossed["speed"], np.mean))
-        for line, crossed in zip(areas.lines, crossings, strict=True)
-    ]  # fmt: skip
+    lines = [_line(line.name, crossed, minutes) for line, crossed in zip(areas.lines, crossings, strict=True)]
     return Measures(
         np.array(zones, ZONE),
         np.concatenate([np.zeros(0, COUNT), *people]),
@@ -101,11 +96,15 @@ def measure_tracks(
 
 def _zone(name: str, area: float, people: Rows, visits: Rows, deviation: float) -> tuple[object, ...]:
     counts = (_of(people["people"], np.mean), deviation, people["people"].max(initial=0))
+    flow = (visits["entered"].sum(), visits["left"].sum(), len(visits))
     dwell = (_of(visits["dwell"], np.mean), _of(visits["dwell"], np.median))
-    return (
-        name, area, *counts, visits["entered"].sum(), visits["left"].sum(), len(visits), *dwell,
-        _of(people["density"], np.mean),
-    )  # fmt: skip
+    return (name, area, *counts, *flow, *dwell, _of(people["density"], np.mean))
+
+
+def _line(name: str, crossings: Rows, minutes: float) -> tuple[object, ...]:
+    to_left = (crossings["to"] == "left").sum()
+    speed = _of(crossings["speed"], np.mean)
+    return name, to_left, len(crossings) - to_left, len(crossings) / minutes, speed
 
 
 def _of(values: Rows, statistic: Callable[..., object]) -> object:

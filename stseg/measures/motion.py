@@ -7,25 +7,23 @@ from functools import lru_cache
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows
+from stseg.arrays import Floats, Ints, Rows, columns
 from stseg.measures.areas import by_track, stays
 
-TRACK_MEASURE = np.dtype(
-    [("id", "<i8"), ("first", "<i8"), ("last", "<i8"), ("seconds", "<f8"), ("distance", "<f8"), ("mean_speed", "<f8"),
-     ("median_speed", "<f8"), ("fastest", "<f8"), ("standing", "<f8"), ("score", "<f8")]
-)  # fmt: skip
-"""One row per track: metres walked, metres a second over one second each, share of time below 0.2 m/s, nats."""
-SPACING = np.dtype([("frame", "<i8"), ("time", "<f8"), ("people", "<i8"), ("nearest", "<f8"), ("mean_nearest", "<f8")])
-"""One row per frame with two people or more: smallest and mean distance to the nearest person, metres."""
-CELL = np.dtype(
-    [("x", "<f8"), ("y", "<f8"), ("density", "<f8"), ("speed", "<f8"), ("flow_x", "<f8"), ("flow_y", "<f8")]
+TRACK_MEASURE = columns(
+    "id:<i8 first:<i8 last:<i8 seconds:<f8 distance:<f8 mean_speed:<f8 "
+    "median_speed:<f8 fastest:<f8 standing:<f8 score:<f8"
 )
+"""One row per track: metres walked, metres a second over one second each, share of time below 0.2 m/s, nats."""
+SPACING = columns("frame:<i8 time:<f8 people:<i8 nearest:<f8 mean_nearest:<f8")
+"""One row per frame with two people or more: smallest and mean distance to the nearest person, metres."""
+CELL = columns("x:<f8 y:<f8 density:<f8 speed:<f8 flow_x:<f8 flow_y:<f8")
 """One row per bin of the ground: centre, metres; people a square metre; mean speed, m/s; flow, people a metre and
 second."""
-MOTION = np.dtype(
-    [("frame", "<i8"), ("id", "<i8"), ("speed", "<f8"), ("speed_deviation", "<f8"), ("heading", "<f8"),
-     ("heading_deviation", "<f8"), ("acceleration", "<f8"), ("acceleration_deviation", "<f8")]
-)  # fmt: skip
+MOTION = columns(
+    "frame:<i8 id:<i8 speed:<f8 speed_deviation:<f8 heading:<f8 heading_deviation:<f8 "
+    "acceleration:<f8 acceleration_deviation:<f8"
+)
 """One row per person and frame, with standard deviations: metres a second; radians from x towards y; metres a second
 squared along the heading. nan where a track has fewer than three rows nearby."""
 _STANDING = 0.2
@@ -129,10 +127,8 @@ def flow_field(
     count = np.bincount(index, minlength=wide * tall)
     scale = max(len(frames), 1) * side**2
     cells = np.zeros(wide * tall, CELL)
-    cells["x"], cells["y"] = (
-        np.tile(x[0] + side * (np.arange(wide) + 0.5), tall),
-        np.repeat(y[0] + side * (np.arange(tall) + 0.5), wide),
-    )
+    cells["x"] = np.tile(x[0] + side * (np.arange(wide) + 0.5), tall)
+    cells["y"] = np.repeat(y[0] + side * (np.arange(tall) + 0.5), wide)
     cells["density"] = count / scale
     cells["speed"] = np.bincount(index, np.hypot(*velocity[inside].T), wide * tall) / np.maximum(count, 1)
     cells["flow_x"] = np.bincount(index, velocity[inside, 0], wide * tall) / scale
