@@ -1,7 +1,5 @@
 """Answers and names as CSV: what a person says of a run's identities."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

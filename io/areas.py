@@ -1,7 +1,5 @@
 """Zones and lines from GeoJSON in the ground's metres."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ str, a Literal of texts, a tuple of those, any of them or None, or a dataclass o
 no None: a setting that may be None must have it as its default, and is left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path

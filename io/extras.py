@@ -1,7 +1,5 @@
 """Optional libraries: imported on use, with an error that gives the command to install them."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Lenses of files: what is wrong with their numbers is said with the file and the key."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from stseg.arrays import Floats

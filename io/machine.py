@@ -1,7 +1,5 @@
 """Limits of the machine: its cores, memory that is free for this process, and its address space."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """TOML read strictly: types, ranges and shapes are checked, unknown keys refused, errors name the key."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

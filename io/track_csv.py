@@ -1,7 +1,5 @@
 """Tables of ground positions as CSV: `frame,id,x,y` with a header, metres, one row per person and frame."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A camera of another program's calibration: in the world frame of that calibration, before units and axes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The calibration formats: a new one is a reader, an entry here, and a line in docs/rigs.md."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ scipy.io.loadmat crashes on some broken files; a calibration needs no more than 
 at the top level, and those take a page. Source: MAT-File Format, The MathWorks, R2023b, chapter 1.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple

@@ -5,8 +5,6 @@ the image to the ground plane and to the head plane. Both lead to cells of the s
 world's unit; its rows often count downwards, which makes the world left-handed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 

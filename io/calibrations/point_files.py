@@ -1,7 +1,5 @@
 """Point correspondences between images and the scene: CSV with camera, u, v, x, y and perhaps z."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Calibrations of several cameras in one structured file: JSON, TOML or YAML."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 

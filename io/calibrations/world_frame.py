@@ -1,7 +1,5 @@
 """The world frame of a foreign calibration, and the transformation of its cameras to metres with Z up."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args

@@ -9,8 +9,6 @@ other way, from undistorted to distorted, so its radial coefficients (the ration
 strong lens) are fitted to the inverse.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Annotations: CVAT XML, Label Studio JSON and VIA JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Detections of one camera as text: CSV with a header, or MOTChallenge lines."""
 
-from __future__ import annotations
-
 import csv
 import math
 from array import array

@@ -1,7 +1,5 @@
 """The formats of detections: recognised by content; a new one is a reader and an entry here."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path

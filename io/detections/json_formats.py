@@ -5,8 +5,6 @@ the output of `DetInferencer`, one file an image (its folder `preds`), or a list
 one file a frame, each with the boxes of all views.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path

@@ -4,8 +4,6 @@ Source of the compressed form: the COCO API (cocodataset/cocoapi, maskApi.c): co
 the columns, from the third on as differences to the count two before, six bits a character.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The detections of a camera's source: read in any known format, filtered, and counted from frame 0."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

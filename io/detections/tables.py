@@ -1,7 +1,5 @@
 """CSV, Parquet and JSON tables of boxes with columns of any names, and MOTChallenge's ground truth (`gt.txt`)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

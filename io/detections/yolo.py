@@ -1,7 +1,5 @@
 """Ultralytics (YOLO): folders of text files, one a frame, and the JSON of its results."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

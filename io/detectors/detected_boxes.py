@@ -7,8 +7,6 @@ CAMERA.json             the request (detector, video, classes, score), the frame
 Boxes of another request are never taken for those wanted.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping

@@ -5,8 +5,6 @@ finds people who stand upright and whole, from 100 pixels of height on. Source: 
 gradients for human detection, 2005; `HOGDescriptor` of OpenCV 4.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 from io import BytesIO

@@ -5,8 +5,6 @@ Sources: Jocher et al., YOLOv5 and YOLOv8; Wang et al., YOLOv7; Li et al., YOLOv
 section 2; Wang et al., YOLOv10, 2024; Zhao et al., DETRs beat YOLOs on real-time object detection (RT-DETR), 2024.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

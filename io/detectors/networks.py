@@ -1,7 +1,5 @@
 """Networks in ONNX files, run by onnxruntime where it is installed (extra `onnx`), else by OpenCV."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from importlib.util import find_spec

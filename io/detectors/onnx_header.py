@@ -4,8 +4,6 @@ An ONNX file is a ModelProto in the wire format of Protocol Buffers: fields of a
 Source: onnx/onnx.proto of ONNX 1.16; Protocol Buffers, Encoding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

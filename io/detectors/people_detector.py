@@ -1,7 +1,5 @@
 """People in colour pictures by a detector in an ONNX file."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Mapping, Sequence
 from pathlib import Path

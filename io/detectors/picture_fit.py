@@ -1,7 +1,5 @@
 """A camera's picture in the fixed size that a network takes, and its boxes back in the camera's pixels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """An archive of many runs as one SQLite or DuckDB database: tables recordings, tracks, events and trajectory."""
 
-from __future__ import annotations
-
 import errno
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

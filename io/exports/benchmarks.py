@@ -1,7 +1,5 @@
 """Tracks as the benchmarks of tracking want them: MOTChallenge and WILDTRACK."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path

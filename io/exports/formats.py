@@ -1,7 +1,5 @@
 """The export formats: a new one is a writer, an entry here, and a line in docs/outputs.md."""
 
-from __future__ import annotations
-
 import errno
 import sqlite3
 from collections.abc import Callable, Mapping

@@ -3,8 +3,6 @@
 Both are of the plane: coordinates are the run's metres on the ground, not degrees.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from datetime import UTC, datetime, timedelta

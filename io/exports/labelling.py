@@ -3,8 +3,6 @@
 Frames are the recording's, and edges are pixels of the real image. `stseg` reads each of these formats as boxes.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

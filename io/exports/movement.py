@@ -5,8 +5,6 @@ The datasets of `movement` since 0.17: `position` (time, space, keypoint, indivi
 chunks of its own, so that the file holds no more than the tracks.
 """
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager

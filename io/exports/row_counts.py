@@ -1,7 +1,5 @@
 """Rows of an export, counted in the written file before it gets its name."""
 
-from __future__ import annotations
-
 import json
 import sqlite3
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Plain tables: tracks as CSV, Parquet, and the CSV of napari-tracks and trackpy; measures as CSV or Parquet."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """One camera's frames from videos that a recorder writes into a folder one after the other."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable

@@ -8,8 +8,6 @@ phase with the first camera, so that cameras in phase with each other are not of
                       (bounded)                          (bounded: the oldest lose their observations)
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager

@@ -4,8 +4,6 @@ One frame set is decoded ahead, each camera in its own thread; then reading wait
 files on the disk rather than frames in memory.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack

@@ -1,7 +1,5 @@
 """One live stream, read by FFmpeg and reconnected as long as it takes when it breaks; the clock of live frames."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections import deque

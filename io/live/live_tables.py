@@ -1,7 +1,5 @@
 """The growing tables of a run in progress: tracks, `RUN.h5.live.csv`; corrections, `RUN.h5.live_corrections.csv`."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ Ids below 256 make indexed PNGs of 8 bits, whose palette holds the colours of th
 bits. All images of a folder are of one kind, and either may be the `instances` of a rig file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

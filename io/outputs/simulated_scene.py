@@ -10,8 +10,6 @@ cam1_instances/000000.png                                         ids, 16 bits, 
 A scene that has but some kinds of foreground leaves out the files of the others.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager

@@ -1,7 +1,5 @@
 """Writing of video files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

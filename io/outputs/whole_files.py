@@ -6,8 +6,6 @@ there before. Its name is the mark by which the parts of killed runs are known; 
 A file is replaced only where it carries our mark, and is none that the same command reads.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

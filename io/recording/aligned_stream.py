@@ -5,8 +5,6 @@ A camera with offset o shows frame f of the recording in its own frame f - o or,
 of its frames are found by reading all streams to their ends.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

@@ -9,8 +9,6 @@ Cameras whose frames are aligned by time stamps show the frame nearest in time i
 none (`stseg.io.recording.time_alignment`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, closing

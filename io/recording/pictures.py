@@ -5,8 +5,6 @@ stretches grey of less than 8 bits; Pillow delivers the numbers of palettes, and
 Source: PNG specification, third edition, W3C 2025, sections 5.3, 11.2.1 and 13.12.
 """
 
-from __future__ import annotations
-
 from io import BytesIO
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The text of a rig file: one matrix row a line, units in comments, numbers to the last digit."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import asdict
 from pathlib import Path

@@ -4,8 +4,6 @@ Everything is checked on load, and no later stage checks again. Errors name the 
 the value found and the value expected. Paths in the file are relative to it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields, replace

@@ -1,7 +1,5 @@
 """The files of a source: one, a list, or those of a pattern, in chronological order."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import suppress

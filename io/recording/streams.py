@@ -1,7 +1,5 @@
 """One camera's frames in order, behind one protocol for videos, images and boxes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Protocol
 

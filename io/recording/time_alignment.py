@@ -11,8 +11,6 @@ and is blind where there is none near. Unless the rig decides (`clock`), stamps 
 4. Otherwise frames are counted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

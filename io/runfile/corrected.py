@@ -1,7 +1,5 @@
 """Run files with corrected identities: a copy whose tables and labels have other ids."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -4,8 +4,6 @@ The writer creates this layout and the reader checks it. silx, h5web and nexpy r
 signal, axes, interpretation), xarray the dimension scales, PedPy /trajectory with @fps and the root's @wkt_geometry.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args

@@ -5,8 +5,6 @@ Threads may pack frames side by side, and what is packed is copied from file to 
 in the whole frame (labels are small, log-odds are rounded); these are deflated once for all frames.
 """
 
-from __future__ import annotations
-
 import math
 import zlib
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Provenance of a run: the resolved configuration, the rig, versions, and the files of every stream."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Iterator, Mapping

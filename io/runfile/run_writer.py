@@ -1,7 +1,5 @@
 """Incremental writer of run files and segment files; a file takes its name once it is complete."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Self

@@ -3,8 +3,6 @@
 XML is read without document types, so that no entity can be declared and expanded.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import stat

@@ -4,8 +4,6 @@ They bound memory and time, and lie far beyond real recordings: a rig of 256 cam
 docs/security.md lists them for users.
 """
 
-from __future__ import annotations
-
 CAMERAS = 256
 NAME = 100
 """Characters of a camera's or scene's name."""

@@ -4,8 +4,6 @@ numpy.load evaluates headers as Python and allocates what they declare; here onl
 read, from headers of the form that NumPy writes. Source: NEP 1, "A Simple File Format for NumPy Arrays".
 """
 
-from __future__ import annotations
-
 import math
 import re
 import struct

@@ -9,8 +9,6 @@ the free space; where that is false, it walks on the spot without end and cannot
 So heaps are checked first.
 """
 
-from __future__ import annotations
-
 import errno
 import math
 import struct

@@ -3,8 +3,6 @@
 Form, digits, finiteness and range of a number are checked before it is used; a caller names file and key.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """The views of a frame that deliver colour images, with their foreground."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ lower edge, with a larger tolerance where the box ends early, because nearer peo
 differ from detector to detector, and are learned (`stseg.noise.box_noise_estimate`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ A box is not full of person: the corners are background. So each is filled with 
 with legs and a narrower head, that falls from the box's score to 0 over a soft border inside the box.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Outlines of pillars on a raster: one span of columns a row, from the discs of `stseg.bodies.pillars`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

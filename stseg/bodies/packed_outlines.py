@@ -1,7 +1,5 @@
 """Outlines of many pillars with as many rows as each has: a near one has hundreds, most have some ten."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple, Self
 

@@ -5,8 +5,6 @@ of the pillar's height in the image. So pillars are sorted by classes of that he
 of their middle: the pillars that a box may fit are one run of each class.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple, Self
 

@@ -1,7 +1,5 @@
 """One view of the detector: outlines of the lattice's pillars, and the observation of a frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

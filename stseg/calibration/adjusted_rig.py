@@ -1,7 +1,5 @@
 """The rig of a bundle adjustment, and the reprojection statistics of each view."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ the camera than the body's axis, by an offset that is adjusted too. Levenberg-Ma
 eliminated (Triggs et al., Bundle adjustment: a modern synthesis, 2000, section 6.1), Geman-McClure weights.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

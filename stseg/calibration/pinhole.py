@@ -3,8 +3,6 @@
 Square pixels and a radial lens; the principal point is near the image's middle. Points are x, y, z in metres, z up.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

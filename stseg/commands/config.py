@@ -1,7 +1,5 @@
 """`stseg config`: the configuration as a file that can be given back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

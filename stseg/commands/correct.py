@@ -1,7 +1,5 @@
 """`stseg correct`: a run with the identities that a person has corrected."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

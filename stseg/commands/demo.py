@@ -1,7 +1,5 @@
 """`stseg demo`: all steps on a small simulated scene."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`stseg detect`: boxes of people in the videos of a rig."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`stseg evaluate`: scores of a run against truth."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

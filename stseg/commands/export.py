@@ -1,7 +1,5 @@
 """`stseg export`: the tracks of a run file in another format."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`stseg inspect`: the contents of a run file, or of a rig file's sources, on one screen."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`stseg labels`: for every pixel of every camera, which track it shows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """The command `stseg`: one sub-command a file, imported once it is asked for."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import sys

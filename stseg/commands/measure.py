@@ -1,7 +1,5 @@
 """`stseg measure`: numbers of a run for zones, lines and the ground."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

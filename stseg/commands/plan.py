@@ -1,7 +1,5 @@
 """`stseg plan`: how long a run will take and how large its file will be, before it is begun."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`stseg report`: a run as one HTML page, as pictures and as a film."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`stseg review`: a page that asks about the decisions of which a run is least sure."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

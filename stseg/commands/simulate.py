@@ -1,7 +1,5 @@
 """`stseg simulate`: render a scene with ground truth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

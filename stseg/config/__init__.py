@@ -1,7 +1,5 @@
 """Configuration: one frozen dataclass for each section; meaning and unit of a key stand below it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 
 from stseg.config.detection import DetectionConfig, ErrorRateConfig, LabelConfig, OccupancyConfig, ProposalConfig

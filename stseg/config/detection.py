@@ -1,7 +1,5 @@
 """Constants of per-frame detection, candidate proposals, the occupancy volume and pixel labels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

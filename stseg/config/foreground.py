@@ -1,7 +1,5 @@
 """Constants of the foreground: background models and sudden changes of light."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal
 

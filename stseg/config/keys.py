@@ -1,7 +1,5 @@
 """Keys of the configuration: names, descriptions, which are meant for users, and which have an effect."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 from collections.abc import Iterator

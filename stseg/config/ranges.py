@@ -1,7 +1,5 @@
 """Ranges of settings, declared with their fields and checked when settings are made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import field, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """Constants of the alternative trackers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

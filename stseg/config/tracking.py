@@ -1,7 +1,5 @@
 """Constants of people and their motion, of segmentation, tracking, and of long and live recordings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

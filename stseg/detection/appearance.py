@@ -1,7 +1,5 @@
 """Appearance of each detected person in each view: features of the detector's box, and colours of trunk and legs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

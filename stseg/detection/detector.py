@@ -5,8 +5,6 @@ updates what a session learns of its views: noise of boxes, sizes of people, eat
 Predicted tracks are candidates, too, and a birth away from the border costs (docs/how-it-works.md, Detection).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Explanation of a frame by an estimate: people, rejected candidates, and the assignment of boxes and pixels."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

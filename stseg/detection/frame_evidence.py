@@ -1,7 +1,5 @@
 """Evidence of one frame: observations of all views and the prior, and the detection problem of any candidates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

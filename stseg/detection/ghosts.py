@@ -7,8 +7,6 @@ over several frames (`stseg.segmentation.existence`), and final tracks are prune
 main reason against each ghost is read from the rows of a run file (`stseg.records.ghost_reasons`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints

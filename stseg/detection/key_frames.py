@@ -17,8 +17,6 @@ Otherwise the frame is searched as a whole. The rule reads the frame's number, i
 it does not depend on the process that works on the frame.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

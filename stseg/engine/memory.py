@@ -4,8 +4,6 @@ Measured: a ground of 20 m x 20 m and 7 views, 0.9 GiB; 40 m x 40 m, 3.8 GiB; ta
 2 views, 0.5 GiB of boxes and 0.7 GiB of pixels.
 """
 
-from __future__ import annotations
-
 from math import prod
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Observations from a caller's arrays, checked against the rig's cameras."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@
 What is learned from a recording, and its frames, are of a `stseg.engine.session.Session`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Protocol, cast

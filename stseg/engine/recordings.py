@@ -1,7 +1,5 @@
 """A caller's recordings, runs and configurations, each as an object, or as the path of a file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Notes and progress of long work, as the engine reports them; printing is the caller's."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager

@@ -1,7 +1,5 @@
 """The population prior of a run: the configuration's, and what the rig says of the bodies that it watches."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any

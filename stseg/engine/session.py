@@ -9,8 +9,6 @@ its own from the frame on at which it has more than one core: threads cost a sev
 still takes the frames in their order, so the results are the same, bit for bit.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """A run that has no end of its own stops when it is asked to: by Ctrl-C or SIGTERM, and finishes what it has begun."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """`stseg.track`: a recording to a run file, as the command `stseg run` does it."""
 
-from __future__ import annotations
-
 import shutil
 import weakref
 from collections.abc import Iterator, Mapping

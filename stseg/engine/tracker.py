@@ -1,7 +1,5 @@
 """`stseg.Tracker`: tracks from arrays in memory, frame set by frame set, without a file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The reading of a truth under which tracks would match it: another unit, axes exchanged, frames or ground moved."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ Each track is laid on each person whom it shares frames with. The motion under w
 rows again, until they stay the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Literal
 

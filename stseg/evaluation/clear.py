@@ -4,8 +4,6 @@ Source: Bernardin and Stiefelhagen, "Evaluating multiple object tracking perform
 mostly tracked, mostly lost and fragments: Li, Huang and Nevatia, CVPR 2009.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Source: Luiten et al., "HOTA: a higher order metric for evaluating multi-object tracking", IJCV 129, 2021.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints

@@ -1,7 +1,5 @@
 """All scores of one run."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

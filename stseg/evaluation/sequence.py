@@ -1,7 +1,5 @@
 """Truth and tracks aligned by frame, without ignored rows; assignment of people to tracks in one frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

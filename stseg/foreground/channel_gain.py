@@ -5,8 +5,6 @@ same wherever the background shows, and scatters where people are. So the gain i
 this holds even where people cover more than half of the view.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Singles

@@ -10,8 +10,6 @@ bilinear between the nodes, by weighted least squares with a scale s that falls 
 agree. w_p is the probability that a pixel showed background before the light changed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import sparse
 

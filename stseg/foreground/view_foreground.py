@@ -1,7 +1,5 @@
 """From the observation of a camera to the evidence of its view: a likelihood map, or boxes."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects

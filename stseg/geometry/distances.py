@@ -1,7 +1,5 @@
 """Distances between places of the ground."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

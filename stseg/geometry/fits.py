@@ -1,7 +1,5 @@
 """Fitting a view to points: ground homography by DLT, vertical from points above ground or from square pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

@@ -1,7 +1,5 @@
 """The occupancy grid: cells of a ground rectangle, and planes above them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

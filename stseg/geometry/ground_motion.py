@@ -1,7 +1,5 @@
 """Similarities of the ground: fitted to points, and applied to rigs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

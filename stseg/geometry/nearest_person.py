@@ -1,7 +1,5 @@
 """Assignment of ground places to the nearest person."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints

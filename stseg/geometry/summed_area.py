@@ -4,8 +4,6 @@ Likelihoods are taken in whole levels of 1 / TOP_LEVEL, so that sums are exact, 
 sum over a footprint comes from four entries by differences, and is itself below 2^32.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, Self
 
 import numpy as np

@@ -7,8 +7,6 @@ Moves go through the labels in ascending order until a whole round has changed n
 with the fewest changes is made, so each change lowers the energy and the result depends on energy and start alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

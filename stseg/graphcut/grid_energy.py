@@ -6,8 +6,6 @@ Neighbours differ by one of a set of offsets (time, plane, y, x); edges in time 
 y-x plane to those of the next. All terms are integer multiples of one quantum, so that energies compare exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

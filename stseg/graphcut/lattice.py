@@ -1,7 +1,5 @@
 """Implicit neighbourhood of a space-time grid: node numbers with guards, neighbours by addition."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

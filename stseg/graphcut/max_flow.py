@@ -8,8 +8,6 @@ with `excess` < 0 that much to the sink. When no node is active, the source tree
 reach from the source: of all minimum cuts, the one with the smallest source set.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ and its complement, gives a lower bound and labels of some nodes that a global m
 into components: small ones are enumerated, larger ones improved by flips of one or two nodes, which can leave a gap.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product

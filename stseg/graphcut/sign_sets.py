@@ -5,8 +5,6 @@ subset of S gains nothing, so all of S has label 0 in the minimum with the small
 found by removing violating cells from {u <= 0} until none is left. The mirror rule gives label 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Both return the smallest source set, so their labels are equal bit for bit. PyMa
 joins to either terminal to the source; here its source stands for label 0, so that label 1 has the smallest set.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Minimum cut of an arbitrary graph given by its edges."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Flags, Ints, Labels

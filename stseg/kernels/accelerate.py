@@ -6,8 +6,6 @@ A kernel keeps its signature for type checkers, fills arrays that it is given, a
 `STSEG_PLAIN_NUMBA=1`, `numba.njit` does. With `NUMBA_DISABLE_JIT=1` every kernel is plain Python.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress

@@ -5,8 +5,6 @@ stale when its file changes, or a file of kernels or constants that its file imp
 are stale when numba has another version or code is made in another way.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import re

@@ -4,8 +4,6 @@ Reading a kernel unpickles and executes it. So a file that another user owns or 
 those of its digest (half written, damaged), counts as missing: the kernel is compiled again, and the file replaced.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import stat

@@ -6,8 +6,6 @@ optimised once a kernel's address is asked for, which Python needs to call it. T
 are not documented; `stseg.kernels.accelerate` says of which versions they are.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress

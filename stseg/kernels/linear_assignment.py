@@ -3,8 +3,6 @@
 `scipy.optimize.linear_sum_assignment` does the same outside kernels.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints

@@ -5,8 +5,6 @@ there is to compile in kernels that pass a large one on. An address is one numbe
 0.61, tuples are passed as they are.
 """
 
-from __future__ import annotations
-
 from typing import Any, TypeVar
 
 import numba

@@ -1,7 +1,5 @@
 """Zones and lines on the ground: people in zones, their visits, and crossings of lines by direction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

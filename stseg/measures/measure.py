@@ -1,7 +1,5 @@
 """All measures of a run's tracks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Speeds of tracks with their uncertainty, distances between people, and fields of density and flow."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 

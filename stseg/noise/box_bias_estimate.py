@@ -19,8 +19,6 @@ All views have one mean: what differs between them cannot be told from a ground 
 cannot be told from taller people.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

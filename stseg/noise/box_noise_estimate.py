@@ -12,8 +12,6 @@ the most likely ones of a split normal distribution of known mode. People count 
 evidence supports them, and boxes at the border of the image, which are cut there, do not count.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Noise, sizes and failures that a session has learned for detection from the frames it explained."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from stseg.noise.box_bias_estimate import BoxBiasEstimate

@@ -16,8 +16,6 @@ Of what is constant for a person they are found from n differences over each lag
 a variogram that few outliers hardly change (Cressie and Hawkins 1980, eq 10): a person who sits down is no error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -12,8 +12,6 @@ people are more alike than a population. Only rigs of pixels learn: a detector's
 and says nothing of widths.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -21,8 +21,6 @@ segmentation's errors; and a longer one at the mean of all views, which are most
 forgotten (`stseg.records.forgetting`). Only rigs of pixels learn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

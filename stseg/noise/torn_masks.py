@@ -8,8 +8,6 @@ the outlines of the people or outside, k of them foreground,
     log p = sum over views, inside and outside, of k log(k / n) + (n - k) log((n - k) / n).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -13,8 +13,6 @@ with b' for b within reach of a person. The ray of an empty cell then meets fore
 (the E step of `stseg.occupancy.error_rate_estimate`), so b and b' converge to the means of M from any first guess.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, Self
 
 import numpy as np

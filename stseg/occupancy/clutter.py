@@ -1,7 +1,5 @@
 """Clutter of a view and the weight that follows from it (Khan and Shah 2009, eqs 5 to 7)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Singles

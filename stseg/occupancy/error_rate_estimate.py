@@ -18,8 +18,6 @@ probability that the other views give it, so that a missed person is no clutter.
 estimate of observers' error rates (Applied Statistics 28, 1979) per frame, each observer's own vote left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -20,8 +20,6 @@ A view that sees only a share a_i of the footprint past nearer people counts as 
 by a_i, and n_vis = sum_i a_i.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple, Self
 

@@ -1,7 +1,5 @@
 """Prior log-odds of a frame's cells, and their revision where a later decision changes the people of the frame."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import logit
 

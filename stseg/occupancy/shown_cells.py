@@ -12,8 +12,6 @@ the summed-area tables that hold the likelihoods and the people's pixels.
 All tables hold the cells that a view sees in *block order*, plane by plane: a block's lie side by side in memory.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple
 

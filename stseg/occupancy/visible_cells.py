@@ -6,8 +6,6 @@ Which person a pixel shows is known on a raster, some thirty rows to a body, so 
 whatever the image's resolution. Most footprints show no person at all; a summed-area table finds them.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

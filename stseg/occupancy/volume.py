@@ -1,7 +1,5 @@
 """Occupancy of a frame: from the evidence of the views and its explanation to a volume of log-odds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple

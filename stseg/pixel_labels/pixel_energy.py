@@ -7,8 +7,6 @@ where the paper has 0 or 1 (eqs 13 to 15). Costs are relative to the background,
 pixel more than the sum of its edges is in no minimum, so only pixels in and around people are nodes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Pixel labels of each view, frame by frame (Huang and Wang, T-ASE 9(1), 2012, section IV-B)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Connected pieces of labelled ground cells of one frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from stseg.arrays import Floats, Ints, Labels

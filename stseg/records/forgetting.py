@@ -1,7 +1,5 @@
 """Sums of weights and weighted measurements that are forgotten at exp(-t / memory): the state of learned noise."""
 
-from __future__ import annotations
-
 from types import EllipsisType
 
 import numpy as np

@@ -3,8 +3,6 @@
 The decision itself is taken by the detector (`stseg.detection.ghosts`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Input and result of per-frame detection: view evidence; people, ghosts, and the assignment of boxes and pixels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

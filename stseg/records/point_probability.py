@@ -4,8 +4,6 @@ A score is the evidence for a person given the others of a set. Another set may 
 elsewhere, the more so the fewer views see a place: by any score, a point is wrong as often as those of as many views.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import expit
 

@@ -9,8 +9,6 @@ track k against being a birth is
 with d_jk the Mahalanobis distance of the places. Each track is assigned to one candidate at most.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

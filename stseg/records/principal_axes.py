@@ -1,7 +1,5 @@
 """Principal axes of appearance features: the few numbers that tell most about the boxes of a recording."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

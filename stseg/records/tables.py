@@ -4,8 +4,6 @@ Each is a structured array; positions are metres on the ground, boxes pixels of 
 the recording's first frame, track ids from 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

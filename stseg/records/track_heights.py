@@ -1,7 +1,5 @@
 """Heights of tracks by the rows that measured one: a row that was not measured has the height nan."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Rows

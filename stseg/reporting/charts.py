@@ -1,7 +1,5 @@
 """Charts over time as inline SVG: number of people, and lifetimes of tracks."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from html import escape

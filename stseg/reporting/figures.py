@@ -1,7 +1,5 @@
 """The report's figures, for the page and for files alike, and the pictures of a film."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Statistics of a run: certainty of its tracks, people by the minute and hour, ground by number of views."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Kernels of blobs: the label of each ground cell, the nearest cell of a person's track, and centroids."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Labels, Singles

@@ -1,7 +1,5 @@
 """Blobs: ground regions of each track in each frame."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import label as connected
 

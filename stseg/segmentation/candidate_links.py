@@ -6,8 +6,6 @@ A link saves the birth of the later candidate and the death of the earlier one, 
 place is as the continuation of the earlier one than as the place of any other person.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ Cells that the binary cut leaves empty stay empty, exactly: no label of a cell g
 source set of the greater gains contains those of smaller ones. So only the components need be expanded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol

@@ -1,7 +1,5 @@
 """Motion field of ground cells, along which edges in time run."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Labels

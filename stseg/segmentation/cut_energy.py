@@ -7,8 +7,6 @@ Neighbours differ by one of a set of offsets (time, plane, y, x). Edges in time 
 moves several cells between frames, and an edge to the same cell would join the body to empty floor.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

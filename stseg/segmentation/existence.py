@@ -14,8 +14,6 @@ that are closer than the reach of a body exclude each other, since their evidenc
 exclusions are not: roof duality. A path through a candidate that another one excludes falls apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

@@ -12,8 +12,6 @@ R, the reach of a body's cells around its place. An unknown body may be anywhere
 the prior share of occupied cells.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

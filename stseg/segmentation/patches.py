@@ -12,8 +12,6 @@ Patches grow until their borders are in G. They hold the cells of all people, so
 elsewhere a cell's successor is the same cell.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

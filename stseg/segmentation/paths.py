@@ -1,7 +1,5 @@
 """Paths of candidates by a minimum-cost flow (Zhang, Li and Nevatia, CVPR 2008), and marginals along them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

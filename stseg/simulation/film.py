@@ -1,7 +1,5 @@
 """Render a scene: frame sets of all cameras in order, with their truth."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Specification of a simulated scene in physical quantities, and its random streams."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """`stseg.correct`: identities solved again, with the answers of a person as hard constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

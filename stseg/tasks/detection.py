@@ -1,7 +1,5 @@
 """`stseg.detect`: boxes of people in the videos of a recording, and a rig file that uses them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

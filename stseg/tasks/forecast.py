@@ -1,7 +1,5 @@
 """`stseg.plan`: duration and size of a run, from short parts of its recording that are tracked."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial

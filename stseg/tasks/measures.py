@@ -1,7 +1,5 @@
 """`stseg.measure`: people in zones, at lines, and over the ground."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 

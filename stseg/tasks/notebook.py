@@ -1,7 +1,5 @@
 """A run in a notebook: its plan as a picture, and its film."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path

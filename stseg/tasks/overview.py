@@ -1,7 +1,5 @@
 """Summary of a run file, for `stseg inspect` and the report."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`stseg.label_images`: for every pixel of every camera, the track that it shows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`stseg.report`: a run as one HTML page, as pictures and as a film."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import repeat

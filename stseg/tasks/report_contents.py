@@ -1,7 +1,5 @@
 """Contents of the report's page, gathered from a run file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

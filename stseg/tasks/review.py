@@ -3,8 +3,6 @@
 That is by what solving identities with the opposite decision loses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

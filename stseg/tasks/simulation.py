@@ -1,7 +1,5 @@
 """`stseg.simulate`: a rendered scene with ground truth."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

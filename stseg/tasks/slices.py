@@ -1,7 +1,5 @@
 """`stseg inspect --slice`: one plane of one frame of a run file as a picture."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

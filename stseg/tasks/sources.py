@@ -1,7 +1,5 @@
 """The sources of a rig file: what they were recognised as, what they deliver, and pictures of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

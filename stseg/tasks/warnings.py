@@ -1,7 +1,5 @@
 """Warnings about a finished run: views that are silent, moved, off or torn, and bodies other than configured."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

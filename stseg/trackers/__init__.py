@@ -1,7 +1,5 @@
 """Trackers: multi-target tracking methods behind one protocol, imported when they are asked for."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import cast
 

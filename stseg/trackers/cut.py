@@ -3,8 +3,6 @@
 See docs/how-it-works.md, Energy and Tracks.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future

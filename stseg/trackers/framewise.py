@@ -1,7 +1,5 @@
 """Trackers that commit every frame at once, without a cut."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

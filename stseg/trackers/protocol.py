@@ -1,7 +1,5 @@
 """The tracker protocol: fused frames in, committed frames out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol

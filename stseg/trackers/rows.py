@@ -1,7 +1,5 @@
 """Rows of the trajectory table for one frame."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

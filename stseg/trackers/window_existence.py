@@ -1,7 +1,5 @@
 """Revision of the detections of a window's frames by a decision of existence over the whole window."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

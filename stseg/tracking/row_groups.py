@@ -3,8 +3,6 @@
 Isolated tracklets are parts of tracks between encounters and gaps, which belong to one person for certain.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows

@@ -6,8 +6,6 @@ boundary. Encounters near a boundary are decided again by global association. Al
 that is longer than patience.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

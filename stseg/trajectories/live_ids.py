@@ -6,8 +6,6 @@ the latest minutes are decided as those of a whole run are (`stseg.identities.as
 published; where an id holds another person, its rows are corrected.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Iterator
 from itertools import pairwise
 

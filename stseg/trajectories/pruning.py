@@ -1,7 +1,5 @@
 """Short tracks are dropped (Huang and Wang 2012, section V.E)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Rows

@@ -1,7 +1,5 @@
 """Tracks of people who come back: one identity for all visits, which the events tell."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

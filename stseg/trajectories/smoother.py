@@ -10,8 +10,6 @@ error allows, however many rows there are. All tracks are smoothed at the same t
 second rows, and so on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Of right views of five real recordings 58 % to 100 % of the feet that do not mee
 own frame (none of 27 views warns: by this, fewer than 11 in 100 do, 95 %); of exchanged ones less than a quarter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

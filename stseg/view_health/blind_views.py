@@ -3,8 +3,6 @@
 A stream that hangs repeats its last picture, mask or boxes while the other cameras go on: the view is frozen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Image registration of colour cameras to their backgrounds: a shift of one pixel reveals a knocked camera."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 

@@ -10,8 +10,6 @@ towards itself: its residual understates its error. Views along the same line of
 views, or two that face each other, positions cannot decide which is wrong; all views as far off are reported.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Each sign takes many boxes. Where a reading of the numbers is named, it fits bod
 does not. None of 23 views of five real recordings leaves one: by this, fewer than 13 in 100 views do (95 %).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ and compared with their places by all views. The mean of one frame is rough, the
 centimetre or two.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Warnings of views that are silent, contradict the others or lose evidence, and of bodies other than configured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -23,8 +23,6 @@ view and shown by two other views: of two views alone, the failing one is not de
 A camera that is pushed still shows people: `knocked_views` recognises it, and its view is excluded too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 

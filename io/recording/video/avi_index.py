@@ -4,8 +4,6 @@ FFmpeg leaves out what it cannot read, and numbers what follows as if nothing ha
 Source: Microsoft, AVI RIFF File Reference: AVIOLDINDEX.
 """
 
-from __future__ import annotations
-
 import os
 import struct
 from pathlib import Path

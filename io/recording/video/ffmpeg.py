@@ -5,8 +5,6 @@ So a path is given as `file:PATH`, the protocol of files is the only one allowed
 session descriptions are, is refused: no container of video is text.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import stat

@@ -1,8 +1,6 @@
 """Motion JPEG videos by their packets, each of which is a whole picture: time stamps without decoding, and pictures at
 a half, a quarter or an eighth of their size, of which the decoder makes no more than is asked for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

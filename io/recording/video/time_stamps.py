@@ -3,8 +3,6 @@
 Stamps start again with each file. A file follows the previous one without a gap, unless the rig gives its start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

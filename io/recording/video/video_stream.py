@@ -1,7 +1,5 @@
 """A video file read frame by frame. Its length is the number of frames that decode; headers are not trusted."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import cv2

@@ -1,7 +1,5 @@
 """Checks of a run file: its layout before anything is read, the values of a table when it is read."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A text of any length is a reference of 16 bytes into a global heap, with the tex
 length, up to 4 GiB, before it looks into the heap; so memory is bounded while one is read.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A run file as layers of napari: the volume, the labels, the tracks. `stseg/napari.yaml` registers it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

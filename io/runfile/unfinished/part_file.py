@@ -1,7 +1,5 @@
 """The file object that HDF5 writes to: failures and interrupts are deferred until HDF5 has returned."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal

@@ -1,7 +1,5 @@
 """Files of an unfinished run, read as untrusted: finished segments, named by their checksums, and time stamps."""
 
-from __future__ import annotations
-
 import re
 from hashlib import blake2b, file_digest
 from pathlib import Path

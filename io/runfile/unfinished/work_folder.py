@@ -12,8 +12,6 @@ Files are written atomically. A segment's name contains its checksum; a segment 
 it is read as untrusted: whatever cannot be read is made again, or refused in one line.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -7,8 +7,6 @@ belief is the views' particles, each view weighted by its resolution on the grou
 paper's section 5.2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -10,8 +10,6 @@ target sends a target's ground the message e(g) = sum_n b_n phi(g, h_n), with b_
 particles. In the views occlusion keeps targets apart: see `TargetLikelihood.nearer`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ bins of its value. A body has one histogram for each of its parts, the thirds of
 where a colour is. Colours are sampled at a lattice of points in an ellipse inside the box.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Bytes, Floats

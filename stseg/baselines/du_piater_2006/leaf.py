@@ -1,7 +1,5 @@
 """A leaf of the star: one view's particles in one frame, and its message (Du and Piater 2006, eqs 8 to 11)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints

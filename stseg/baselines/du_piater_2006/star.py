@@ -14,8 +14,6 @@ and e the messages of other targets (`exclusion`). Beliefs are (eqs 10, 11)
 The view's own prior is in its belief, as it is in its message; the paper's eq. 10 leaves it out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

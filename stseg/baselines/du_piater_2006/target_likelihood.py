@@ -1,7 +1,5 @@
 """Colour likelihood p(z | x) of a target at a place in a view (Du and Piater 2006, section 3.3, in eqs 8 to 11)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Belief propagation between views, which updates tracks by colours (Du and Piater 2006, eqs 4 to 11)."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

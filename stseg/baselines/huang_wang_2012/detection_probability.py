@@ -13,8 +13,6 @@ p(F_i | X) is at least the rate at which a view misses a whole person, so that o
 p(X) is uniform over the area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ unassigned detections are births. The paper's temporal check, which removes shor
 (`stseg.trajectories.final_tracks.committed_tracks`).
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -11,8 +11,6 @@ Those that meet are one mode, with mean and covariance
 to which the variance within a cell of the lattice is added. The paper takes C = 0.80 m.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ detection probability (HW12 section III). A proposal at the place of an earlier 
 chosen by `proposals.source`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ localiser = Localiser(rig, "footprint")
 volume = localiser.synergy(maps, localiser.clutter_weights(maps), least=0.05)
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

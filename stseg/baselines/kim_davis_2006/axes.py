@@ -13,8 +13,6 @@ The axes of all views, mapped to the ground as lines a x + b y + c = 0 with a^2 
 with w_i the sum of the posterior probabilities of the segmented pixels, relative to the body's area.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -9,8 +9,6 @@ one half at the distance W(h) of the body's outline. The distance W is logistic,
 the body ends as it does at its sides.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -7,8 +7,6 @@ Each channel is kept in a byte. Densities are relative to the uniform distributi
 a share of outliers (badges, noise, the ground between the legs) bounds the effect of one pixel.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Singles

@@ -3,8 +3,6 @@
 A particle is the places of all people, float64 (n, 2); particles are float64 (particle, n, 2), metres.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

@@ -8,8 +8,6 @@ histogram. The paper leaves it out, which favours particles in which a person is
 typical distance between different people.
 """
 
-from __future__ import annotations
-
 import math
 
 from stseg.arrays import Floats, Ints, Labels, Singles

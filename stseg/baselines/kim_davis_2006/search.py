@@ -1,7 +1,5 @@
 """Iterated localisation: segment, find the axes, intersect them, repeat (Kim and Davis 2006, section 3.3, eq. 5)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ starts beside a person converges to the person. The paper starts tracks by hand 
 detections start them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar

@@ -3,8 +3,6 @@
 Pairwise alignments are merged: views join one ground greedily by their joint support.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, permutations

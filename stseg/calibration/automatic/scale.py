@@ -4,8 +4,6 @@ Feet are seen nearer to the camera than the body's axis. What is not known of th
 by which heights, and distances of one view, differ from the distances between views.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

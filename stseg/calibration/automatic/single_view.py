@@ -5,8 +5,6 @@ determine the horizon, the vertical, the focal length and the camera's height in
 Lv, Zhao and Nevatia, Camera calibration from video of a walking human, PAMI 28(9), 2006.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from operator import itemgetter
 

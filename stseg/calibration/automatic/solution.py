@@ -1,7 +1,5 @@
 """Alternation of correspondence and bundle adjustment: endpoints of all views to cameras on one ground."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

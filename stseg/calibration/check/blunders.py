@@ -1,7 +1,5 @@
 """Blunders of a recording rather than of a camera's pose: swapped streams and delayed streams."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -5,8 +5,6 @@ candidate is compared with the boxes of the other views, and candidates are sele
 of confirmations. Gates are wide (half a metre), so that a displaced view still takes part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

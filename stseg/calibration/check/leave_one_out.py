@@ -5,8 +5,6 @@ its boxes, in standard deviations of a box's edges. Residuals in the view that w
 across the viewing ray, so that near and far views are comparable.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Check of a rig against the boxes of its recording, the verdict as text, and the coverage of its views."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

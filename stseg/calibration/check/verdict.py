@@ -6,8 +6,6 @@ is removed. A view is reported when it is off by more than a cell and when corre
 makes all views agree best; the others are judged after the correction.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

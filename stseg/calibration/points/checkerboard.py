@@ -1,7 +1,5 @@
 """Camera matrix and lens of a camera from views of a checkerboard (Zhang, PAMI 22(11), 2000, as OpenCV has it)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

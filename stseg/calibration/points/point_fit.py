@@ -5,8 +5,6 @@ outliers; the result is least squares over the inliers. All is computed in a fra
 the ground, or a wall.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal

@@ -1,7 +1,5 @@
 """Checks of measured points, and of the camera fitted to them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

@@ -1,7 +1,5 @@
 """Radial coefficients of a lens that points bear out."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.stats import f as fisher
 

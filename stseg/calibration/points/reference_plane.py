@@ -1,7 +1,5 @@
 """The plane of reference of measured points: the ground, or another one that holds four of them, such as a wall."""
 
-from __future__ import annotations
-
 from heapq import nlargest
 from itertools import combinations
 

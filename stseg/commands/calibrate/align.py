@@ -1,7 +1,5 @@
 """`stseg calibrate align`: a rig on a known ground."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

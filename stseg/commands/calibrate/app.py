@@ -1,7 +1,5 @@
 """`stseg calibrate`: make a rig file, or check one."""
 
-from __future__ import annotations
-
 from cyclopts import App
 
 from stseg.commands.calibrate.align import align

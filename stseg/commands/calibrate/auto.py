@@ -1,7 +1,5 @@
 """`stseg calibrate auto`: a rig from the videos themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal

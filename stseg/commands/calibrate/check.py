@@ -1,7 +1,5 @@
 """`stseg calibrate check`: check a rig against its recording."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`stseg calibrate import`: a rig from another program's calibration."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`stseg calibrate lens`: camera matrix and lens from a video of a checkerboard."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`stseg calibrate page`: a page on which ground points are clicked."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote

@@ -1,7 +1,5 @@
 """`stseg calibrate points`: a rig from measured points."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

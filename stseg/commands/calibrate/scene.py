@@ -1,7 +1,5 @@
 """Options of `stseg calibrate` besides the cameras: scene, grid and streams."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

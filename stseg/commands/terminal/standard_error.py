@@ -1,7 +1,5 @@
 """Standard error of commands: progress and notes; libraries that decode pictures write there past every handler."""
 
-from __future__ import annotations
-
 import faulthandler
 import os
 import sys

@@ -1,7 +1,5 @@
 """Tables on standard output: as wide as the terminal, and whole where a pipe or a file takes them."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Answers to SIGINT and SIGTERM: an orderly end where it comes in time, else an end at once."""
 
-from __future__ import annotations
-
 import _thread
 import os
 import signal

@@ -1,7 +1,5 @@
 """The birth lattice: places on the ground where the unexplained evidence may show a further person."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

@@ -7,8 +7,6 @@ weighs more than in the largest body that explains it: of all common bodies that
 person, the one with the greatest sum of log-odds, counted in pixels that are certainly foreground.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles

@@ -4,8 +4,6 @@ A frame has several rounds, each with other boxes free; the pillars that fit a b
 of the free ones: their score is that of the frame without boxes, and they cost nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ A pool grows from search to search of a frame, and the lists of those that it ha
 looked for.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints

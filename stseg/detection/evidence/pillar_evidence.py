@@ -5,8 +5,6 @@ box around it. Pixels are summed only where all views together may be evidence e
 else, the sum is the number of pixels times the lowest.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints

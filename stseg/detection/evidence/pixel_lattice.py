@@ -1,7 +1,5 @@
 """The pillars of the birth lattice in the views that deliver pixels: their outlines, and the boxes around these."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Self
 

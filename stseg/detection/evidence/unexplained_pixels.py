@@ -6,8 +6,6 @@ What pixels may add to a score is at most the sum of those that are rather foreg
 are left, and most cells have none around them.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, Self
 
 import numpy as np

@@ -4,8 +4,6 @@ One more member changes the score of a view for the members behind, for those wh
 the boxes of these, and so on. They are few, so the boxes of a view are assigned anew among them alone.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

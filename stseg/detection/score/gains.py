@@ -3,8 +3,6 @@
 Gains are kept, view by view, until a member comes or goes that they depend on.
 """
 
-from __future__ import annotations
-
 from stseg.arrays import Floats, Ints
 from stseg.detection.score.box_state import box_gain, box_part
 from stseg.detection.score.pixel_state import assign_in_view, overlaps, pixel_gain, pixel_part, reassign_pixels

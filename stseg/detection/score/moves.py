@@ -3,8 +3,6 @@
 The work of a move is that of its neighbourhood.
 """
 
-from __future__ import annotations
-
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import DetectionProblem, RaggedArray
 from stseg.detection.score.box_state import link

@@ -3,8 +3,6 @@
 Candidates whose outlines share no pixel in a view have nothing to do with each other there.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

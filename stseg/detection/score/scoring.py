@@ -19,8 +19,6 @@ have no core. Wider bodies touch earlier, so d is the distance over the mean of 
 process of marked points). Narrow ones get no nearer for it: the remains of a silhouette are slim, too.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

@@ -5,8 +5,6 @@ pixels only inside its outline (`pixel_state`), that of boxes only among the mem
 that of tracks along one path (`track_state`): with the set's assignment at hand, the gain is a sum over these alone.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, cast
 
 import numpy as np

@@ -4,8 +4,6 @@ One more member takes a track, the member before takes another or none, and so o
 augmenting path, and an assignment that is best before is best after it (Kuhn 1955).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

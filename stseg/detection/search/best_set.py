@@ -7,8 +7,6 @@ one less or one exchanged for a nearby one, nor any that simple moves reach once
 group that is too large for this ends with the best set that a number of gains led to.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Ints

@@ -16,8 +16,6 @@ boxes alone the height is found with the place (`refine`), and no width: a box's
 strides. M step: the frame is searched again with the sizes found (`stseg.detection.detector`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

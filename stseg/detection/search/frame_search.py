@@ -5,8 +5,6 @@ are found once those are. After each round the set is searched again, until a ro
 search, rejected candidates that were nearly accepted are fitted to their pixels (docs/how-it-works.md, Detection).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

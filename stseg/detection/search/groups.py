@@ -5,8 +5,6 @@ box in a view with boxes, where both may continue one track, and where they stan
 a set is the sum of the scores of its groups, exactly.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Flags, Ints

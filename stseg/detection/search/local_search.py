@@ -5,8 +5,6 @@ before the whole is judged: so one ghost gives way to the two people that it had
 the one person who explains both.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Flags, Ints

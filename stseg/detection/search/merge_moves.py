@@ -5,8 +5,6 @@ Adding, removing or replacing one person does not lead back: the two hold each o
 measured without them. So close members are also tried as one, measured with all that they explain together.
 """
 
-from __future__ import annotations
-
 from operator import attrgetter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Members of an estimate at the means of their posteriors, by the boxes and pixels that are assigned to each."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ person, and no exchange of one member for nearby candidates leads back: the ghos
 track. So the weak members are removed together, and the frame is searched from the others.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats

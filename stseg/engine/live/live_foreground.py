@@ -4,8 +4,6 @@ A camera with an empty scene uses the same background as in a run over the whole
 (`stseg.engine.offline.backgrounds`). A camera without one learns from the first frames received, and is then updated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from copy import deepcopy
 

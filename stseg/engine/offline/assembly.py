@@ -1,7 +1,5 @@
 """Assembly of the run file from the segment files: stitched tracks of the whole run, and the volume with their ids."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor

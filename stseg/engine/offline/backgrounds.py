@@ -5,8 +5,6 @@ own. Changes of daylight and moved furniture thus have little effect, and the re
 segment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar

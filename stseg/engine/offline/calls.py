@@ -1,7 +1,5 @@
 """A call whose result is needed later: in another process, while this one goes on, or here, once it is asked for."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress

@@ -1,7 +1,5 @@
 """Boxes in place of videos that name a detector: made once, before a run or by `stseg detect`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The job of a run: recording, configuration, tracker and frames, which all its segments share."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """People of an earlier run, by whom those of a later one are recognised: `stseg run --known`."""
 
-from __future__ import annotations
-
 from hashlib import blake2b
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tracking of one segment: frames in, a segment file out. A segment depends on no other segment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """The file of a segment: a run file of its frames, and of its warm-up the trajectory."""
 
-from __future__ import annotations
-
 from collections import deque
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack

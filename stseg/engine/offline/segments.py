@@ -5,8 +5,6 @@ tracks, and continues until its last window is solved. The result depends only o
 it is the same after an interrupted run, in another process, and on another machine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count

@@ -4,8 +4,6 @@ Recording, rig and output have the same paths on all machines. A worker writes i
 returns only the path; the segment of a worker that dies is assigned to another.
 """
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError

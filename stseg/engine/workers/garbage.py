@@ -4,8 +4,6 @@ Reference counts free all that a frame makes; the collector of cycles finds noth
 tables and tracks for it: 3 % of a run's time with Python's thresholds.
 """
 
-from __future__ import annotations
-
 import gc
 
 _THRESHOLDS = 100_000, 20, 100

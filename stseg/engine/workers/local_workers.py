@@ -4,8 +4,6 @@ Each worker has a pipe of its own and one segment at a time. Thus a worker that 
 assigned to another. The last to work share the cores of those that have nothing left to do.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 from collections import Counter

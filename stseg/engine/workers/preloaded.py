@@ -1,7 +1,5 @@
 """Imports and kernels from the cache, loaded once in the process from which all workers are forked."""
 
-from __future__ import annotations
-
 import os
 import signal
 

@@ -1,7 +1,5 @@
 """The processes that make segments: this one, several of this machine, or the workers of a Dask scheduler."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -30,8 +30,6 @@ outwards twenty times as fast, so that they hold most of the brightness seen, an
 A colour that only a shadow or a highlight explains updates nothing.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

@@ -7,8 +7,6 @@ and from one row to the next: the state of all views is larger than a processor'
 order is there in time. Pixels that need branches are treated one by one.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

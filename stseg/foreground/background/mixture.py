@@ -31,8 +31,6 @@ Light that changes over the whole view, slowly or at once, is a gain of each cha
 `absorption_time`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

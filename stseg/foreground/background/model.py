@@ -7,8 +7,6 @@ The likelihood is a posterior: the probability that a pixel shows a person, incl
 views has a prior of its own, so the pixel's is divided out before (`stseg.foreground.view_foreground`).
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from copy import copy

@@ -6,8 +6,6 @@ colour of which nothing is known (symbols as in `stseg.foreground.background.mix
     log-odds = log f ((1 - m) U + m dimmed) / ((1 - f) ((1 - e) ((1 - s) lit + s dimmed) + e U)),   within 5 nats.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple, Self
 

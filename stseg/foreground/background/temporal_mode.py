@@ -4,8 +4,6 @@ A median needs the background in more than half of the frames, which a crowded s
 colours and the background has one, so the colour with the most similar ones finds it wherever it is the commonest.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

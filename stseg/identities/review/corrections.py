@@ -4,8 +4,6 @@ Every answer cuts the tracks that it names at its frame. Between two pieces of o
 answer removes it; a swap crosses the links of two tracks, a join adds one. Pieces that links connect are one identity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Decisions of a run in the order of doubt: encounters, gaps, births and deaths inside the area."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

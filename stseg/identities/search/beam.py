@@ -4,8 +4,6 @@ In every frame each hypothesis is extended by its best assignment of rows to ide
 from it (`alternatives`); the best of them are the next hypotheses (`choice`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ of numbers drawn at random for each row (Zobrist 1970): of each identity's first
 Keys take time, and of many alternatives few are chosen: they are found for the best first, until enough differ.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

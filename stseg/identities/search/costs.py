@@ -1,7 +1,5 @@
 """Costs of the rows of a frame as those of identities or of new people."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

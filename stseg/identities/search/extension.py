@@ -5,8 +5,6 @@ one, which has the number after all of these. Alternatives differ little from th
 follow their track are never exchanged.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Summary of a run as questions and answers of a sentence or two (HTML)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

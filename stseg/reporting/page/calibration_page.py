@@ -1,7 +1,5 @@
 """The page on which ground points are clicked: frames of all cameras, a plan, style and script in one file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape

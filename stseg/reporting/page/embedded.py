@@ -4,8 +4,6 @@ Volumes are small grey PNG sheets, as many frames as a budget of bytes allows. A
 below one another, each with y up. Grey 0 is a cell that no view sees; 1 to 127 are log-odds from -limit to limit.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 A page holds its style, and a script with its data; nothing is loaded from elsewhere.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

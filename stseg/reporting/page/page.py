@@ -1,7 +1,5 @@
 """The report as one HTML page: pictures, charts, style and script are inside, and nothing is loaded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape

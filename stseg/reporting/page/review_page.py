@@ -1,7 +1,5 @@
 """The page that asks about doubtful identities: a plan of the seconds around each decision, one key for each answer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape

@@ -3,8 +3,6 @@
 Points are float (n, 2), u to the right and v down, pixel centres at integers. A point that is nan interrupts a line.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 import cv2

@@ -5,8 +5,6 @@ that neighbours on the hue circle still differ. Lightness and chroma are those o
 color space for image processing", 2020): no track shouts louder than another, on white or on dark ground.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Overlays on a camera's image: tracks (pillars, ids and trails), or the ground's grid with upright poles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The plan view: coverage, cameras and tracks from above."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 

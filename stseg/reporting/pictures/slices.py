@@ -1,7 +1,5 @@
 """Pictures of one frame's occupancy volume: all planes, one plane, and the maximum over the planes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Arrivals and goals of simulated pedestrians: come, walk to a place, stand there, meet another person, leave."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Scripted routes of pedestrians, for scenes with encounters at known times."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

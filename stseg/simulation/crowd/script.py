@@ -1,7 +1,5 @@
 """A crowd on scripted routes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

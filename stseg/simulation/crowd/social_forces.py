@@ -4,8 +4,6 @@ Each is driven towards a goal and repelled by neighbours (Helbing and Molnar, So
 dynamics, Phys. Rev. E 51, 1995, eqs 2 to 4, 10); a hard constraint keeps bodies apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import overload

@@ -4,8 +4,6 @@ The skeleton's proportions are those of Drillis and Contini, Body segment parame
 rounded. In the body's own frame x points forward, y to the left and z up.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

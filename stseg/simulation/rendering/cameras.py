@@ -1,7 +1,5 @@
 """Cameras in a ring around the area, and the viewing ray of every pixel."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Singles

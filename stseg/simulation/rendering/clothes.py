@@ -1,7 +1,5 @@
 """Clothing: two colours and a pattern for each body part."""
 
-from __future__ import annotations
-
 import colorsys
 from functools import lru_cache
 

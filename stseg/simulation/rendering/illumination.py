@@ -1,7 +1,5 @@
 """Sudden changes of illumination: a switched lamp, a cloud, automatic exposure."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

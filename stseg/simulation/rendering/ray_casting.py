@@ -1,7 +1,5 @@
 """Ray casting of bodies: each pixel's ray is intersected with the ellipsoids with boxes that contain the pixel."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Render one camera's frames of a scene: room, shadows, people and sensor."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

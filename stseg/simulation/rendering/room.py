@@ -1,7 +1,5 @@
 """The empty room in each camera: a tiled floor and plastered walls, rendered once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

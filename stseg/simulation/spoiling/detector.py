@@ -1,7 +1,5 @@
 """Model of a person detector: missed, inexact and false boxes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Boxes, Floats, Ints

@@ -4,8 +4,6 @@ Each error takes the mask uint8 (v, u), 0..255; the person at each pixel (v, u),
 (`stseg.simulation.spoiling.spoil.STRENGTHS`); and the camera's moment.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Colour frames, instance images and the truth stay as they are. Errors of a frame
 and the frame alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

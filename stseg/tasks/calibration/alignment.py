@@ -1,7 +1,5 @@
 """`stseg.align_rig`: a rig turned, shifted and scaled onto the ground of points, of a floor plan or of another rig."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path

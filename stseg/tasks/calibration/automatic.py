@@ -1,7 +1,5 @@
 """`stseg.calibrate_auto`: a rig from the videos themselves, by people who walk where several cameras see them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

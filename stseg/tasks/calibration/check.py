@@ -1,7 +1,5 @@
 """`stseg.check_rig`: a rig against its recording, by the people in it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """`stseg.calibrate_points`: a rig from measured points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

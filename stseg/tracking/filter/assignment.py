@@ -1,7 +1,5 @@
 """One-to-one assignment of least cost."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stseg.arrays import Floats, Ints

@@ -12,8 +12,6 @@ u of two more coordinates (an augmented state, section 8.2):
     u' = r u + N(0, (1 - r^2) I),  r = exp(-t / tau)
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

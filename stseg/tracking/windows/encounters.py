@@ -5,8 +5,6 @@ Blobs of people who walk together separate and touch again every few frames: con
 `tracking.separation_time` between them are one encounter of the run (docs/how-it-works.md, Tracks).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ assignment by shared ground cells. An unassigned tracklet continues an undetecte
 a birth.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field

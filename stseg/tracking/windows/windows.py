@@ -1,7 +1,5 @@
 """Overlapping windows of frames: solved together, and committed in part."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
