@@ -137,9 +137,11 @@ def _add_video_track(request: Request, found: DetectionList, place: str, value: 
     label, size = str(next(iter(value.get("labels", [])), "")), np.array(request.size * 2)
     keys = ("frame", *_PERCENT)
     table = np.array(
-        [[number(request.path, place, key, required_value(request.path, place, step, key)) for key in keys]
-         for step in steps]
-    ).reshape(-1, 5)  # fmt: skip
+        [
+            [number(request.path, place, key, required_value(request.path, place, step, key)) for key in keys]
+            for step in steps
+        ]
+    ).reshape(-1, 5)
     if (np.diff(table[:, 0]) <= 0).any() or table[-1:, 0].sum() - table[:1, 0].sum() > limits.INTERPOLATED - len(found):
         expected = f"rising frames, and at most {limits.INTERPOLATED} boxes between all keyframes"
         raise FormatError(request.path, place, "keyframes that do not rise, or are far apart", expected)

@@ -23,8 +23,14 @@ JSON_FORMATS: tuple[tuple[str, Callable[[Any], bool], Callable[[Request, Any], D
 )
 """Name of each format of JSON, whether parsed JSON is of it, and its reader."""
 NAMES = (
-    "Ultralytics text", "WILDTRACK", *(one for one, *_ in JSON_FORMATS), "CVAT XML", "Parquet", "CSV", "MOTChallenge"
-)  # fmt: skip
+    "Ultralytics text",
+    "WILDTRACK",
+    *(one for one, *_ in JSON_FORMATS),
+    "CVAT XML",
+    "Parquet",
+    "CSV",
+    "MOTChallenge",
+)
 """All formats, for messages."""
 
 

@@ -121,9 +121,14 @@ class DetectionList:
         self._mask.append(mask)
 
     def add_corners(
-        self, place: str, frame: int, corners: Sequence[object], score: object = 1.0, label: str = "",
+        self,
+        place: str,
+        frame: int,
+        corners: Sequence[object],
+        score: object = 1.0,
+        label: str = "",
         mask: Mask | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Add a detection by its left, top, right and bottom edges."""
         if len(corners) != 4 or isinstance(corners, str):
             raise FormatError(self._path, place, f"a box {corners!r}"[:100], "4 numbers")

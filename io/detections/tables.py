@@ -98,9 +98,11 @@ def _collect(request: Request, header: Sequence[str], rows: Sequence[tuple[str, 
     form = _form(at)
     if form is None or "frame" not in at:
         raise FormatError(
-            request.path, "header", f"the columns {', '.join(header)}"[:200],
+            request.path,
+            "header",
+            f"the columns {', '.join(header)}"[:200],
             "frame, left, top, width, height (or right, bottom; or x, y of the middle), or `columns` in the rig",
-        )  # fmt: skip
+        )
     found = DetectionList(request.path)
     for place, row in rows:
         if len(row) < len(header):

@@ -103,16 +103,37 @@ def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:
     yield "recordings", [(*about, grid.x[0], grid.y[0], grid.x[1], grid.y[1], len(run.tracks), people)]
     lengths = _path_lengths(run.trajectory)
     yield "tracks", (_track(run, name, row, lengths.get(int(row["id"]), 0.0)) for row in run.tracks)
-    yield "events", (
-        (name, int(e["frame"]), int(e["frame"]) / rate, e["kind"].decode(errors="replace"), int(e["id"]),
-         int(e["other"]), e["reason"].decode(errors="replace"))
-        for e in run.events
-    )  # fmt: skip
-    yield "trajectory", (
-        (name, int(r["frame"]), int(r["frame"]) / rate, int(r["id"]), float(r["x"]), float(r["y"]),
-         _finite(r["height"]), _finite(r["score"]))
-        for r in run.trajectory
-    )  # fmt: skip
+    yield (
+        "events",
+        (
+            (
+                name,
+                int(e["frame"]),
+                int(e["frame"]) / rate,
+                e["kind"].decode(errors="replace"),
+                int(e["id"]),
+                int(e["other"]),
+                e["reason"].decode(errors="replace"),
+            )
+            for e in run.events
+        ),
+    )
+    yield (
+        "trajectory",
+        (
+            (
+                name,
+                int(r["frame"]),
+                int(r["frame"]) / rate,
+                int(r["id"]),
+                float(r["x"]),
+                float(r["y"]),
+                _finite(r["height"]),
+                _finite(r["score"]),
+            )
+            for r in run.trajectory
+        ),
+    )
 
 
 def _path_lengths(trajectory: Rows) -> dict[int, float]:

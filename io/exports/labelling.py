@@ -23,18 +23,29 @@ def write_coco(path: Path, run: Run) -> None:
     """Write a COCO data set: an image `CAMERA/FRAME.png` for each view of each frame, boxes with `track_id`."""
     cameras = run.recording.rig.cameras
     images = [
-        {"id": view + 1 + index * len(cameras), "file_name": f"{camera.name}/{frame:06d}.png",
-         "width": camera.size[0], "height": camera.size[1], "frame": frame}
+        {
+            "id": view + 1 + index * len(cameras),
+            "file_name": f"{camera.name}/{frame:06d}.png",
+            "width": camera.size[0],
+            "height": camera.size[1],
+            "frame": frame,
+        }
         for index, frame in enumerate(run.frames.tolist())
         for view, camera in enumerate(cameras)
-    ]  # fmt: skip
+    ]
     image = run.boxes["view"] + 1 + np.searchsorted(run.frames, run.boxes["frame"]) * len(cameras)
     annotations = [
-        {"id": k + 1, "image_id": int(number), "category_id": 1, "track_id": int(row["id"]), "iscrowd": 0,
-         "bbox": [round(float(row[name]), 2) for name in _EDGES],
-         "area": round(float(row["width"]) * float(row["height"]), 2)}
+        {
+            "id": k + 1,
+            "image_id": int(number),
+            "category_id": 1,
+            "track_id": int(row["id"]),
+            "iscrowd": 0,
+            "bbox": [round(float(row[name]), 2) for name in _EDGES],
+            "area": round(float(row["width"]) * float(row["height"]), 2),
+        }
         for k, (number, row) in enumerate(zip(image.tolist(), run.boxes, strict=True))
-    ]  # fmt: skip
+    ]
     about = {"description": f"{run.scene}, {MARK.decode()}"}
     categories = [{"id": 1, "name": _PERSON}]
     data = {"info": about, "images": images, "annotations": annotations, "categories": categories}
@@ -49,10 +60,15 @@ def write_cvat(path: Path, run: Run) -> None:
 def _cvat(run: Run, view: int) -> str:
     size, stop = run.recording.rig.cameras[view].size, int(run.frames[-1]) + 1 if len(run.frames) else 0
     lines = [
-        '<?xml version="1.0" encoding="utf-8"?>', "<annotations>", "<version>1.1</version>", "<meta><task>",
-        f"<size>{stop}</size><mode>interpolation</mode>", f"<labels><label><name>{_PERSON}</name></label></labels>",
-        f"<original_size><width>{size[0]}</width><height>{size[1]}</height></original_size>", "</task></meta>",
-    ]  # fmt: skip
+        '<?xml version="1.0" encoding="utf-8"?>',
+        "<annotations>",
+        "<version>1.1</version>",
+        "<meta><task>",
+        f"<size>{stop}</size><mode>interpolation</mode>",
+        f"<labels><label><name>{_PERSON}</name></label></labels>",
+        f"<original_size><width>{size[0]}</width><height>{size[1]}</height></original_size>",
+        "</task></meta>",
+    ]
     for identity, rows in _tracks(run, view):
         lines.append(f'<track id="{identity}" label={quoteattr(_PERSON)}>')
         ends = np.append(np.diff(rows["frame"]) > 1, True)
@@ -78,10 +94,15 @@ def write_label_studio(path: Path, run: Run) -> None:
 def _task(run: Run, view: int) -> list[dict[str, object]]:
     size, stop = run.recording.rig.cameras[view].size, int(run.frames[-1]) + 1 if len(run.frames) else 0
     result = [
-        {"id": f"track{identity}", "type": "videorectangle", "from_name": "box", "to_name": "video",
-         "value": {"framesCount": stop, "labels": [_PERSON], "sequence": _keyframes(rows, size, run.frame_rate)}}
+        {
+            "id": f"track{identity}",
+            "type": "videorectangle",
+            "from_name": "box",
+            "to_name": "video",
+            "value": {"framesCount": stop, "labels": [_PERSON], "sequence": _keyframes(rows, size, run.frame_rate)},
+        }
         for identity, rows in _tracks(run, view)
-    ]  # fmt: skip
+    ]
     return [{"data": {"video": f"{run.cameras[view]}.mp4"}, "annotations": [{"result": result}]}]
 
 
@@ -89,11 +110,18 @@ def _keyframes(rows: Rows, size: tuple[int, int], frame_rate: float) -> list[dic
     """Frames count from 1 there, and edges are percent; a box is there until a keyframe that is not enabled."""
     goes_on = np.append(np.diff(rows["frame"]) == 1, False)
     return [
-        {"frame": int(row["frame"]) + 1, "time": round(float(row["frame"]) / frame_rate, 3), "rotation": 0,
-         "enabled": is_on, "x": 100 * float(row["left"]) / size[0], "y": 100 * float(row["top"]) / size[1],
-         "width": 100 * float(row["width"]) / size[0], "height": 100 * float(row["height"]) / size[1]}
+        {
+            "frame": int(row["frame"]) + 1,
+            "time": round(float(row["frame"]) / frame_rate, 3),
+            "rotation": 0,
+            "enabled": is_on,
+            "x": 100 * float(row["left"]) / size[0],
+            "y": 100 * float(row["top"]) / size[1],
+            "width": 100 * float(row["width"]) / size[0],
+            "height": 100 * float(row["height"]) / size[1],
+        }
         for row, is_on in zip(rows, goes_on.tolist(), strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _tracks(run: Run, view: int) -> Iterator[tuple[int, Rows]]:

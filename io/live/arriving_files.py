@@ -114,9 +114,7 @@ class ArrivingVideos:
     Files of `notes` were read before: they are skipped unopened. Colour frames are reduced by a whole factor.
     """
 
-    def __init__(
-        self, source: Source, camera: Camera, files: ArrivingFiles, notes: FileNotes, factor: int = 1
-    ) -> None:  # fmt: skip
+    def __init__(self, source: Source, camera: Camera, files: ArrivingFiles, notes: FileNotes, factor: int = 1) -> None:
         self._source, self._camera, self._files, self._notes, self._factor = source, camera, files, notes, factor
         self._known = list(notes.read.get(camera.name, []))
         self._stream: VideoStream | None = None

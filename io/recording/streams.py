@@ -154,9 +154,7 @@ class JoinedStream:
         return open_stream(self._parts[self._at], self._camera, stamps, self._factor)
 
 
-def open_stream(
-    source: Source, camera: Camera, times: Sequence[Floats] | None = None, factor: int = 1
-) -> Stream:  # fmt: skip
+def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None = None, factor: int = 1) -> Stream:
     """The stream of a source for a camera whose image size its frames must have.
 
     With the time stamps of all frames, from `Stream.times`, a video is not decoded up to a distant frame. Colour frames

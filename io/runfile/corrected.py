@@ -24,9 +24,15 @@ NewIds = Callable[[Ints, Ints], Ints]
 
 
 def write_corrected(
-    run: Path, path: Path, tracks: Tracks, answers: Rows, new_ids: NewIds, names: Mapping[int, str], text: str,
+    run: Path,
+    path: Path,
+    tracks: Tracks,
+    answers: Rows,
+    new_ids: NewIds,
+    names: Mapping[int, str],
+    text: str,
     overwrite: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Copy a run file to a path with other tracks; evidence (log_odds, ghosts, rates) is copied unchanged.
 
     `answers` are the ANSWER rows (n,) so far, `new_ids` gives the ids of the labels. The provenance keeps `names` by

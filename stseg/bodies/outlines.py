@@ -65,9 +65,15 @@ def paint_outlines(order: Ints, first: Ints, spans: Spans, assigned: Shorts) -> 
 
 
 def sums_inside(
-    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, step: int, values: Singles, owner: Shorts,
+    table: BodyTable,
+    ground: Floats,
+    heights: Floats,
+    widths: Floats,
+    step: int,
+    values: Singles,
+    owner: Shorts,
     number: Ints,
-) -> tuple[Floats, Floats]:  # fmt: skip
+) -> tuple[Floats, Floats]:
     """Sums of a map inside outlines of pillars, several for each person: quicker than outlines that are kept.
 
     Parameters
@@ -97,9 +103,17 @@ def sums_inside(
 
 @kernel
 def _fill_outlines(
-    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, raster_step: float, columns: int, first: Ints,
-    count: Ints, spans: Spans, area: Floats,
-) -> None:  # fmt: skip
+    table: BodyTable,
+    ground: Floats,
+    heights: Floats,
+    widths: Floats,
+    raster_step: float,
+    columns: int,
+    first: Ints,
+    count: Ints,
+    spans: Spans,
+    area: Floats,
+) -> None:
     rows, (discs, drawn) = spans.shape[1], np.empty((2, len(SILHOUETTE), 6))
     low, high = np.empty(rows), np.empty(rows)
     for i in range(len(ground)):
@@ -113,9 +127,17 @@ def _fill_outlines(
 
 @kernel
 def _fill_sums(
-    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, raster_step: float, values: Singles,
-    owner: Shorts, number: Ints, sums: Floats, area: Floats,
-) -> None:  # fmt: skip
+    table: BodyTable,
+    ground: Floats,
+    heights: Floats,
+    widths: Floats,
+    raster_step: float,
+    values: Singles,
+    owner: Shorts,
+    number: Ints,
+    sums: Floats,
+    area: Floats,
+) -> None:
     people, pillars = heights.shape
     rows, columns = values.shape
     discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((pillars, len(SILHOUETTE), 6))

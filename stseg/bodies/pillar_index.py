@@ -94,9 +94,17 @@ def pillar_range(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, 
 
 @kernel
 def fill_fits(
-    index: PillarIndex, bodies: Floats | Singles, box: Floats, tolerance: Floats, belief: float, width: float,
-    height: float, least: float, pillar: Labels, fit: Floats,
-) -> int:  # fmt: skip
+    index: PillarIndex,
+    bodies: Floats | Singles,
+    box: Floats,
+    tolerance: Floats,
+    belief: float,
+    width: float,
+    height: float,
+    least: float,
+    pillar: Labels,
+    fit: Floats,
+) -> int:
     """Fill pillar (k,) and fit (k,) with the pillars of which a box has a log-likelihood above `least`, and with that.
 
     Parameters

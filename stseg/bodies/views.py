@@ -84,9 +84,14 @@ class View:
     """Pillars of a ground lattice in one camera."""
 
     def __init__(
-        self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig,
+        self,
+        camera: Camera,
+        grid: Grid,
+        lattice_ground: Floats,
+        config: DetectionConfig,
+        body: BodyConfig,
         breadth: float = 1.0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.camera, self.grid = camera, grid
         self.config, self.body = config, body
         self.centre = camera.centre[:2]

@@ -25,9 +25,14 @@ _LOGARITHM = np.log(np.arange(256) + _DARK_OFFSET)
 
 
 def appearance_rows(
-    frame: int, explanation: Explanation, tables: Sequence[BodyTable], axes: Floats | None,
-    observations: Sequence[Observation], evidence: Sequence[ViewEvidence], images: Sequence[Observation] = (),
-) -> Rows:  # fmt: skip
+    frame: int,
+    explanation: Explanation,
+    tables: Sequence[BodyTable],
+    axes: Floats | None,
+    observations: Sequence[Observation],
+    evidence: Sequence[ViewEvidence],
+    images: Sequence[Observation] = (),
+) -> Rows:
     """APPEARANCE rows of a frame: for each view and person that it sees past others.
 
     `explanation` holds the frame's people. Observations, evidence, and `tables` (projected bodies) are of each view, in
@@ -85,9 +90,15 @@ def _colours(
 
 @wide_kernel
 def _add_colours(
-    assigned: PixelAssignment, step: int, is_visible: Flags, box: Floats, image: Bytes, likelihood: Singles,
-    total: Floats, count: Ints,
-) -> None:  # fmt: skip
+    assigned: PixelAssignment,
+    step: int,
+    is_visible: Flags,
+    box: Floats,
+    image: Bytes,
+    likelihood: Singles,
+    total: Floats,
+    count: Ints,
+) -> None:
     """Add the logarithms of colours to total (person, slice, channel), and their number to count (person, slice).
 
     Of each raster pixel that is assigned (v, u) to a visible person (person,) with a box (person, 4) is in pixels,

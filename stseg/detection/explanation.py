@@ -31,10 +31,17 @@ def explained_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:
     ground = _outside_core(refined.pool.ground, members, estimate.problem)
     bodies = Candidates(ground, refined.track_sizes.height, refined.track_sizes.width)
     people = People(
-        bodies.ground, bodies.height, bodies.width, refined.covariance, estimate.losses, score.view_evidence,
-        _visibility(estimate), candidate_prior_log_odds(estimate, members, score.track_index), score.track_index,
+        bodies.ground,
+        bodies.height,
+        bodies.width,
+        refined.covariance,
+        estimate.losses,
+        score.view_evidence,
+        _visibility(estimate),
+        candidate_prior_log_odds(estimate, members, score.track_index),
+        score.track_index,
         refined.sizes,
-    )  # fmt: skip
+    )
     pixel_assignment = [
         pixels if isinstance(view, PixelView) else _painted(view, bodies)
         for view, pixels in zip(views, estimate.pixel_assignment, strict=True)

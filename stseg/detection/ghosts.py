@@ -26,9 +26,17 @@ def rejected_candidates(estimate: MapEstimate) -> People:
         Sizes.of_population(len(rejected), body),
     )
     return People(
-        pool.ground, pool.height, pool.width, covariance, additions.gain, additions.view_evidence,
-        np.ones_like(additions.view_evidence), prior, births, sizes,
-    )  # fmt: skip
+        pool.ground,
+        pool.height,
+        pool.width,
+        covariance,
+        additions.gain,
+        additions.view_evidence,
+        np.ones_like(additions.view_evidence),
+        prior,
+        births,
+        sizes,
+    )
 
 
 def candidate_prior_log_odds(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:

@@ -139,9 +139,14 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.frames[0].frame
     commit = replace(commit, events=np.concatenate(events))
     return CommittedFrames(
-        commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window),
-        np.concatenate(appearance), np.concatenate(shifts),
-    )  # fmt: skip
+        commit,
+        np.concatenate(rows),
+        np.concatenate(parts).astype(np.float32),
+        rates,
+        watch.take(window),
+        np.concatenate(appearance),
+        np.concatenate(shifts),
+    )
 
 
 def rate_rows(frame: int, estimate: ErrorRateEstimate) -> Rows:

@@ -105,9 +105,15 @@ def decides_by_appearance(tracker: type[TrackingMethod], config: Config) -> bool
 
 
 def finished_tracks(
-    rig: Rig, config: Config, tracker: type[TrackingMethod], committed: Rows, events: Rows, appearance: Rows,
-    image_rig: Rig, known: Rows = NO_KNOWN_PEOPLE,
-) -> tuple[Tracks, Ints]:  # fmt: skip
+    rig: Rig,
+    config: Config,
+    tracker: type[TrackingMethod],
+    committed: Rows,
+    events: Rows,
+    appearance: Rows,
+    image_rig: Rig,
+    known: Rows = NO_KNOWN_PEOPLE,
+) -> tuple[Tracks, Ints]:
     """The tracks of a whole run, and the track id of each committed row.
 
     Parameters
@@ -132,9 +138,15 @@ def finished_tracks(
 
 
 def associated_tracks(
-    rig: Rig, config: Config, committed: Rows, events: Rows, appearance: Rows, image_rig: Rig,
-    constraints: Constraints = NO_CONSTRAINTS, known: Rows = NO_KNOWN_PEOPLE,
-) -> tuple[Tracks, Ints]:  # fmt: skip
+    rig: Rig,
+    config: Config,
+    committed: Rows,
+    events: Rows,
+    appearance: Rows,
+    image_rig: Rig,
+    constraints: Constraints = NO_CONSTRAINTS,
+    known: Rows = NO_KNOWN_PEOPLE,
+) -> tuple[Tracks, Ints]:
     """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
     whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints, known)
     return _with_boxes(whole, image_rig, config.body.breadth), whole.identity

@@ -95,9 +95,17 @@ def track(
     recording, earlier = recording_of(rig, sources), None if known is None else Path(known)
     if output is not None:
         return track_recording(
-            recording, Path(output), resolved, tracker, volume, chosen, force, reporter, known=earlier,
+            recording,
+            Path(output),
+            resolved,
+            tracker,
+            volume,
+            chosen,
+            force,
+            reporter,
+            known=earlier,
             overwrite=overwrite,
-        )  # fmt: skip
+        )
     folder = Path(mkdtemp(prefix="stseg-"))
     try:
         run = track_recording(

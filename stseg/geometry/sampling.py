@@ -79,17 +79,31 @@ def _footprints(camera: Camera, rig: Rig, kind: SamplingKind) -> Footprints:
         centre, ahead = camera.project(rig.grid.ground, float(height))
         visible = ahead & camera.inside(centre) & within
         _fill_boxes(
-            rig.grid.ground, float(height), camera.projection, lens, centre, visible, shift, camera.size,
+            rig.grid.ground,
+            float(height),
+            camera.projection,
+            lens,
+            centre,
+            visible,
+            shift,
+            camera.size,
             footprint[plane],
-        )  # fmt: skip
+        )
     return footprint
 
 
 @kernel
 def _fill_boxes(
-    ground: Floats, height: float, projection: Floats, lens: LensTerms, centre: Floats, visible: Flags, shift: float,
-    size: tuple[int, int], boxes: Footprints,
-) -> None:  # fmt: skip
+    ground: Floats,
+    height: float,
+    projection: Floats,
+    lens: LensTerms,
+    centre: Floats,
+    visible: Flags,
+    shift: float,
+    size: tuple[int, int],
+    boxes: Footprints,
+) -> None:
     """Fill boxes (y, x, 4) of whole pixels, clipped to the image, about the centres (y, x, 2) of cells that are seen.
 
     Their sides are the derivative of the pixel, by a shift in metres to either side along x and y, times the cell's

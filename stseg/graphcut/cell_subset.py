@@ -63,9 +63,16 @@ def subset(energy: GridEnergy, inside: Flags) -> CellSubset:
 
 @kernel
 def _fill_edges(
-    nodes: Ints, number: Labels, sign: Bytes, lattice: Lattice, capacity: Labels, start: Ints, end: Ints, weight: Ints,
+    nodes: Ints,
+    number: Labels,
+    sign: Bytes,
+    lattice: Lattice,
+    capacity: Labels,
+    start: Ints,
+    end: Ints,
+    weight: Ints,
     border: Ints,
-) -> int:  # fmt: skip
+) -> int:
     """Fill edges and border capacities; the number of edges.
 
     Parameters

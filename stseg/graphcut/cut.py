@@ -72,9 +72,15 @@ def _residual_graph(reduced: Reduction) -> Graph:
 
 @kernel
 def _fill_arcs(
-    left: Labels, state: Bytes, lattice: Lattice, capacity: Labels, number: Labels, head: Labels, sister: Labels,
+    left: Labels,
+    state: Bytes,
+    lattice: Lattice,
+    capacity: Labels,
+    number: Labels,
+    head: Labels,
+    sister: Labels,
     residual: AnyArray,
-) -> None:  # fmt: skip
+) -> None:
     """Fill head, sister and residual of the arcs of the undecided nodes; slots 2 i and 2 i + 1 are opposite."""
     degree = len(capacity)
     for k, node in enumerate(left):
@@ -173,7 +179,7 @@ def _is_decided(node: int, gain: Labels, undecided: Labels) -> bool:
 @part
 def _sum_neighbours(
     node: int, gain: Labels, undecided: Labels, state: Bytes, lattice: Lattice, capacity: Labels
-) -> None:  # fmt: skip
+) -> None:
     undecided[node] = 0
     for slot in range(len(capacity)):
         neighbour_state = state[np.uint64(neighbour(node, slot, lattice))]

@@ -89,9 +89,7 @@ class GridEnergy:
 
 
 @kernel
-def _energy(
-    unary: Labels, occupied: Flags, at_node: Flags, sign: Bytes, lattice: Lattice, capacity: Labels
-) -> int:  # fmt: skip
+def _energy(unary: Labels, occupied: Flags, at_node: Flags, sign: Bytes, lattice: Lattice, capacity: Labels) -> int:
     """Energy of the occupied cells (time, plane, y, x), at_node (node,); `sign` (node,) knows the guards."""
     frames, planes, rows, columns = unary.shape
     total = 0

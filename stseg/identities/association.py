@@ -45,9 +45,15 @@ class IdentityProblem:
 
     @classmethod
     def of(
-        cls, trajectory: Rows, sizes: MeasuredSizes, appearance: Rows, frame_rate: float, border: Border,
-        config: Config, constraints: Constraints = NO_CONSTRAINTS,
-    ) -> IdentityProblem:  # fmt: skip
+        cls,
+        trajectory: Rows,
+        sizes: MeasuredSizes,
+        appearance: Rows,
+        frame_rate: float,
+        border: Border,
+        config: Config,
+        constraints: Constraints = NO_CONSTRAINTS,
+    ) -> IdentityProblem:
         """The problem of a run; sizes and appearance are learned from it.
 
         `trajectory` is TRAJECTORY (n,) in any order, `sizes` are those of each row, and `appearance` is APPEARANCE (l,)

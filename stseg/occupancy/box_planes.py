@@ -112,9 +112,17 @@ def fill_fit(
                     fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
             continue
         number = fill_fits(
-            index, pillars, box, tolerance, boxes.belief[b], boxes.width, boxes.height, boxes.belief[b] - _LEAST_FIT,
-            pillar, match,
-        )  # fmt: skip
+            index,
+            pillars,
+            box,
+            tolerance,
+            boxes.belief[b],
+            boxes.width,
+            boxes.height,
+            boxes.belief[b] - _LEAST_FIT,
+            pillar,
+            match,
+        )
         for k in range(number):
             h, cell = pillar[k] // ground_cells, pillar[k] % ground_cells
             prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]

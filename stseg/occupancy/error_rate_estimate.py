@@ -110,9 +110,17 @@ def _error_posterior(rate: float, likelihood: float) -> float:
 
 @kernel
 def fill_counts(
-    views: FrameTerms, sums: Sums, inside: Flags, number: Floats, trusted: Flags, rates: Floats, observations: float,
-    prior: float, errors: Floats, trials: Floats,
-) -> None:  # fmt: skip
+    views: FrameTerms,
+    sums: Sums,
+    inside: Flags,
+    number: Floats,
+    trusted: Flags,
+    rates: Floats,
+    observations: float,
+    prior: float,
+    errors: Floats,
+    trials: Floats,
+) -> None:
     """Fill errors and trials (view, 3) with each view's errors and trials of m, b and b' in a frame, in cells.
 
     Parameters

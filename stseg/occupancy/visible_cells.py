@@ -83,9 +83,15 @@ def _hidden_pixels(
 
 @part
 def _others_inside(
-    assigned: PixelAssignment, table: SumTable, left: int, top: int, width: int, height: int, person: int,
+    assigned: PixelAssignment,
+    table: SumTable,
+    left: int,
+    top: int,
+    width: int,
+    height: int,
+    person: int,
     distance: float,
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int]:
     """`_hidden_pixels`, and the sum of the likelihood levels of all pixels that show a person other than `person`."""
     hidden, total = 0, 0
     above, below = np.uint64(assigned.row[np.uint64(top)]), np.uint64(assigned.row[np.uint64(top + height - 1)] + 1)
@@ -149,9 +155,16 @@ def fill_share(
 
 @kernel
 def fill_map(
-    view: int, cells: ShownCells, marked: Flags, footprint: Footprints, table: SumTable, assigned: PixelAssignment,
-    distance: Singles, levels: Levels, share: Singles,
-) -> None:  # fmt: skip
+    view: int,
+    cells: ShownCells,
+    marked: Flags,
+    footprint: Footprints,
+    table: SumTable,
+    assigned: PixelAssignment,
+    distance: Singles,
+    levels: Levels,
+    share: Singles,
+) -> None:
     """Fill levels and share (n + k,) of a view with a map; UNSEEN where it does not see a cell.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background. Blocks

@@ -234,9 +234,17 @@ class Occupancy:
             people.visibility >= _UNOCCLUDED
         )
         fill_counts(
-            fused.terms, fused.sums, inside, cells.number, trusted, np.array(estimate.rates),
-            self.config.effective_observations, self.prior, errors, trials,
-        )  # fmt: skip
+            fused.terms,
+            fused.sums,
+            inside,
+            cells.number,
+            trusted,
+            np.array(estimate.rates),
+            self.config.effective_observations,
+            self.prior,
+            errors,
+            trials,
+        )
         visible = np.maximum(self._tables.sets.size @ self._tables.sets.seen_by, 1)
         units = np.column_stack([np.full(len(errors), body), visible, np.full(len(errors), reached - body)])
         supported = inside[near_cells][(people.evidence >= config.minimum_evidence)[cells.near_person[near_cells]]]
@@ -276,9 +284,14 @@ class Occupancy:
         boxes = ViewBoxes(edges, *noise.of(view.score), owner, width, height)
         fit = np.empty((len(self.heights), near_person.size), np.float32)
         fill_fit(
-            pillars[1], pillars[0], self._height_prior(np.array([self.height_mean]))[0],
-            self._height_prior(people.height), boxes, CellsByPerson.of(near_person, len(people)), fit,
-        )  # fmt: skip
+            pillars[1],
+            pillars[0],
+            self._height_prior(np.array([self.height_mean]))[0],
+            self._height_prior(people.height),
+            boxes,
+            CellsByPerson.of(near_person, len(people)),
+            fit,
+        )
         return fit
 
     def _height_prior(self, expected: Floats) -> Floats:

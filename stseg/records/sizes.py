@@ -64,9 +64,11 @@ class Sizes:
         which are compared with each other.
         """
         return Sizes(
-            self.height, _without(self.height_variance, prior.height_variance),
-            self.width, _without(self.width_variance, prior.width_variance),
-        )  # fmt: skip
+            self.height,
+            _without(self.height_variance, prior.height_variance),
+            self.width,
+            _without(self.width_variance, prior.width_variance),
+        )
 
     def with_prior(self, prior: Sizes) -> Sizes:
         """Posteriors of these measurements with a prior."""

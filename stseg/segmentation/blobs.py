@@ -44,9 +44,13 @@ def find_blobs(
     alone[person[person >= 0]] = False
     without = np.flatnonzero(alone)
     return Blobs(
-        patches.on_ground(cells), np.append(track, people_track[without]), np.append(person, without),
-        np.concatenate([centroid, people_ground[without]]), np.append(extent, np.zeros(len(without))), touches,
-    )  # fmt: skip
+        patches.on_ground(cells),
+        np.append(track, people_track[without]),
+        np.append(person, without),
+        np.concatenate([centroid, people_ground[without]]),
+        np.append(extent, np.zeros(len(without))),
+        touches,
+    )
 
 
 def _in_ground_order(occupied: Flags, place: Ints) -> tuple[Labels, int]:

@@ -97,7 +97,7 @@ class LinkModel:
 @kernel
 def _fill_near(
     frame: Ints, ground: Floats, covariance: Floats, span: int, noise: float, speed: float, pair: Ints
-) -> int:  # fmt: skip
+) -> int:
     """Fill pair (pair, 2), as far as it reaches, with candidates that may be linked; the number of these pairs.
 
     `frame`, `ground` and `covariance` are as of `WindowCandidates`; `span` is the most frames between two that are

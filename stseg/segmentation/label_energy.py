@@ -62,9 +62,17 @@ def track_shares(
         weight[:, :-1] = appearance
     precision: Floats = np.asarray(np.linalg.inv(spread), float)
     _fill_log_weights(
-        frame, ground, height, predicted.expected, predicted.ground, precision, log_volume, predicted.height,
-        body.height_spread, weight,
-    )  # fmt: skip
+        frame,
+        ground,
+        height,
+        predicted.expected,
+        predicted.ground,
+        precision,
+        log_volume,
+        predicted.height,
+        body.height_spread,
+        weight,
+    )
     weight[:, -1] = math.log(body.prior_share)
     share = np.exp(weight - weight.max(1, keepdims=True))
     return np.asarray(share / share.sum(1, keepdims=True))
@@ -85,9 +93,17 @@ def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> L
 
 @kernel
 def _fill_log_weights(
-    frame: Ints, ground: Floats, height: Floats, expected: Flags, predicted_ground: Floats, precision: Floats,
-    log_volume: Floats, head_height: Floats, height_spread: float, weight: Floats,
-) -> None:  # fmt: skip
+    frame: Ints,
+    ground: Floats,
+    height: Floats,
+    expected: Flags,
+    predicted_ground: Floats,
+    precision: Floats,
+    log_volume: Floats,
+    head_height: Floats,
+    height_spread: float,
+    weight: Floats,
+) -> None:
     """Add the tracks' log-weights to weight (n, k + 1), nats; -inf outside the gate."""
     for i in range(len(frame)):
         t = frame[i]

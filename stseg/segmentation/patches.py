@@ -173,9 +173,15 @@ def mark_places(squares: Flags, places: Ints, grid: Grid) -> None:
 
 @kernel
 def _fill_sheet(
-    of_cell: Labels, empty: Singles, cell: Labels, value: Singles, place: Ints, index: Labels, between: np.float32,
+    of_cell: Labels,
+    empty: Singles,
+    cell: Labels,
+    value: Singles,
+    place: Ints,
+    index: Labels,
+    between: np.float32,
     sheet: Singles,
-) -> None:  # fmt: skip
+) -> None:
     """Fill sheet (plane, place on the sheet); index (ground cell,) is each one's place on it, -1 for none."""
     planes, ground = sheet.shape[0], len(index)
     for z in range(planes):

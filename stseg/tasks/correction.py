@@ -74,9 +74,15 @@ def correct(run: Run | Path | str, answers: Path | str, output: Path | str, *, o
     given = tuple(Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows)
     corrected = corrected_tracks(found, given)
     write_corrected(
-        found.path, output, corrected.tracks, corrected.answered, corrected.new_ids, corrected.names,
-        read_text(answers), overwrite,
-    )  # fmt: skip
+        found.path,
+        output,
+        corrected.tracks,
+        corrected.answered,
+        corrected.new_ids,
+        corrected.names,
+        read_text(answers),
+        overwrite,
+    )
     return CorrectedRun(read_run(output), given)
 
 
@@ -100,9 +106,15 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     config = parse_config(run.provenance.config, f"{run.path}: configuration")
     rig = run.recording.reduced(config.foreground.body_rows).reduced_rig
     tracks, identity = associated_tracks(
-        rig, config, run.committed[kept], run.committed_events, run.appearance, run.recording.rig, constraints,
+        rig,
+        config,
+        run.committed[kept],
+        run.committed_events,
+        run.appearance,
+        run.recording.rig,
+        constraints,
         run.known_people,
-    )  # fmt: skip
+    )
     _require_obeyed(constraints, answered.places, identity)
     numbers = _numbers(old[kept], identity, np.concatenate([tracks.events["id"], tracks.events["other"]]))
     solved = Tracks(*(_numbered(rows, numbers) for rows in (tracks.trajectory, tracks.boxes, tracks.events)))

@@ -141,9 +141,15 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
     processed = sum(segment.stop - segment.lead + excess for segment in cuts)
     learned = -(-frames // round(job.config.segments.background_period * rate))
     return Forecast(
-        frames, len(cuts), workers, counting, max(learning) * learned, sum(tracking) / len(parts) * processed,
-        joining[0] + max(joining[1] - joining[0], 0.0) / tried * frames, round(size / tried * frames),
-    )  # fmt: skip
+        frames,
+        len(cuts),
+        workers,
+        counting,
+        max(learning) * learned,
+        sum(tracking) / len(parts) * processed,
+        joining[0] + max(joining[1] - joining[0], 0.0) / tried * frames,
+        round(size / tried * frames),
+    )
 
 
 def _time_of_frame(clock: Floats, cores: int) -> float:

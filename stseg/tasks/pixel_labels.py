@@ -141,7 +141,7 @@ def _appearances(
 
 def _ids(
     view: ViewLabels, people: Rows, pixels: Singles | None, observation: Observation, colours: ViewAppearance | None
-) -> Ints:  # fmt: skip
+) -> Ints:
     """Ids of the tracks that a view shows, int64 (v, u); all 0 for a blind view."""
     if pixels is None:
         return np.zeros(view.camera.size[::-1], np.int64)

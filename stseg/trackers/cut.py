@@ -160,11 +160,16 @@ class CutTracker:
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
             motion_field(
-                now.fused.people.ground, then.fused.people.ground, now.tracks, then.tracks, reach, grid.cell,
+                now.fused.people.ground,
+                then.fused.people.ground,
+                now.tracks,
+                then.tracks,
+                reach,
+                grid.cell,
                 patches.ground,
             )
             for now, then in pairwise(frames)
-        ]  # fmt: skip
+        ]
         steps = np.array(motion, np.int64).reshape(-1, *patches.place.shape, 2)
         successor, present = patches.successors(steps), patches.place >= 0
         return build_energy(log_odds, successor, grid, self.config.segmentation, present)

@@ -141,15 +141,29 @@ def _joined(one: People, other: People) -> People:
         return np.concatenate([getattr(one, name), getattr(other, name)], axis)
 
     return People(
-        both("ground"), both("height"), both("width"), both("covariance"), both("evidence"),
-        both("view_evidence", 1), both("visibility", 1), both("prior"), both("track_index").astype(np.int64),
+        both("ground"),
+        both("height"),
+        both("width"),
+        both("covariance"),
+        both("evidence"),
+        both("view_evidence", 1),
+        both("visibility", 1),
+        both("prior"),
+        both("track_index").astype(np.int64),
         one.sizes.joined_with(other.sizes),
-    )  # fmt: skip
+    )
 
 
 def _at(people: People, chosen: Ints) -> People:
     return People(
-        people.ground[chosen], people.height[chosen], people.width[chosen], people.covariance[chosen],
-        people.evidence[chosen], people.view_evidence[:, chosen], people.visibility[:, chosen], people.prior[chosen],
-        people.track_index[chosen], people.sizes.at(chosen),
-    )  # fmt: skip
+        people.ground[chosen],
+        people.height[chosen],
+        people.width[chosen],
+        people.covariance[chosen],
+        people.evidence[chosen],
+        people.view_evidence[:, chosen],
+        people.visibility[:, chosen],
+        people.prior[chosen],
+        people.track_index[chosen],
+        people.sizes.at(chosen),
+    )

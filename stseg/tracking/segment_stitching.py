@@ -62,8 +62,11 @@ class Stitcher:
         local = local[local > 0]
         before = self._tail(lead)
         named = matches(before, lead)
-        births = [(int(rows["frame"][rows["id"] == i].min()), int(i)) for i in np.unique(lead["id"])
-                  if i not in named and (rows["id"] == i).any()]  # fmt: skip
+        births = [
+            (int(rows["frame"][rows["id"] == i].min()), int(i))
+            for i in np.unique(lead["id"])
+            if i not in named and (rows["id"] == i).any()
+        ]
         for i in local.tolist():
             if i not in named:
                 self.issued += 1

@@ -45,9 +45,15 @@ class FinalTracks:
 
 
 def final_tracks(
-    committed: Rows, events: Rows, appearance: Rows, frame_rate: float, border: Border, config: Config,
-    constraints: Constraints = NO_CONSTRAINTS, known_people: Rows = NO_KNOWN_PEOPLE,
-) -> FinalTracks:  # fmt: skip
+    committed: Rows,
+    events: Rows,
+    appearance: Rows,
+    frame_rate: float,
+    border: Border,
+    config: Config,
+    constraints: Constraints = NO_CONSTRAINTS,
+    known_people: Rows = NO_KNOWN_PEOPLE,
+) -> FinalTracks:
     """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows.
 
     People of earlier recordings, KNOWN_PERSON (k,), keep their ids; all others have greater ones.

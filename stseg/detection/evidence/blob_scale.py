@@ -37,9 +37,14 @@ def blob_scales(
 
 @kernel
 def _fill_scales(
-    every_pixel: UnexplainedPixels, every_pillar: PixelLattice, cells: Ints, height: int, heights: int, certain: float,
+    every_pixel: UnexplainedPixels,
+    every_pillar: PixelLattice,
+    cells: Ints,
+    height: int,
+    heights: int,
+    certain: float,
     scale: Singles,
-) -> None:  # fmt: skip
+) -> None:
     """Raise scale (view, v, u), 0 before, inside the bodies of a height in some cells to what each explains."""
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
     for view in range(len(every_pillar.shapes)):

@@ -52,9 +52,17 @@ class BoxLattice:
         pillar, fit = np.empty(len(index.order), np.int32), np.empty(len(index.order))
         width, height = map(float, view.camera.size)
         found = fill_fits(
-            index, view.bodies.reshape(-1, 4), observation.edges[box], observation.tolerance[box],
-            float(observation.belief[box]), width, height, least, pillar, fit,
-        )  # fmt: skip
+            index,
+            view.bodies.reshape(-1, 4),
+            observation.edges[box],
+            observation.tolerance[box],
+            float(observation.belief[box]),
+            width,
+            height,
+            least,
+            pillar,
+            fit,
+        )
         return pillar[:found].copy(), fit[:found].copy()
 
 

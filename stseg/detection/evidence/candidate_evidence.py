@@ -89,9 +89,14 @@ def box_evidence(
         if observation is not None:
             edges, (width, height) = bodies.edges[k, first:], sizes[k].tolist()
             fill_match(
-                edges, observation.edges, observation.tolerance, observation.belief, width, height,
+                edges,
+                observation.edges,
+                observation.tolerance,
+                observation.belief,
+                width,
+                height,
                 match[k, first:, : len(observation.edges)],
-            )  # fmt: skip
+            )
             fill_inside(edges, width, height, inside[k, first:])
     is_blind = np.array([observation is None for _, observation in chosen], bool)
     hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, base.hiders if base else no_rows(), first)

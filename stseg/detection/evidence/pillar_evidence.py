@@ -18,9 +18,14 @@ _ROUNDING_MARGIN = 1e-6
 
 
 def fill_scores(
-    pixels: UnexplainedPixels, lattice: PixelLattice, probes: Ints, others: Ints, minimum_probe_score: float,
-    weight: float, score: Floats,
-) -> None:  # fmt: skip
+    pixels: UnexplainedPixels,
+    lattice: PixelLattice,
+    probes: Ints,
+    others: Ints,
+    minimum_probe_score: float,
+    weight: float,
+    score: Floats,
+) -> None:
     """Add the evidence of unexplained pixels to the score (height, cell) of pillars, nats; -inf where it cannot matter.
 
     Where all `probes` (heights) of a cell score at most `minimum_probe_score`, all its heights are -inf, without
@@ -55,9 +60,15 @@ def _fill_bounds(every_pixel: UnexplainedPixels, every_pillar: PixelLattice, wei
 
 @kernel
 def _add_evidence(
-    every_pixel: UnexplainedPixels, every_pillar: PixelLattice, heights: Ints, least: float, weight: float,
-    bound: Floats, added: Floats, score: Floats,
-) -> None:  # fmt: skip
+    every_pixel: UnexplainedPixels,
+    every_pillar: PixelLattice,
+    heights: Ints,
+    least: float,
+    weight: float,
+    bound: Floats,
+    added: Floats,
+    score: Floats,
+) -> None:
     """Add the evidence of all views to the score (height, cell) of some heights; -inf where it is not above the least.
 
     Views, each of which adds at most `bound` (view, cell), all together `added` (cell,), follow each other: pillars

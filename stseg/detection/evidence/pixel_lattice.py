@@ -60,9 +60,17 @@ class PixelLattice(NamedTuple):
         pixel_share = np.where(outlines.inside > 0, 1 / np.maximum(outlines.area, 1), 0.0)
         inside_share = (outlines.inside * pixel_share).reshape(per_cell).min(1)
         return cls(
-            outlines, boxes, strips, inside_share, pixel_share.reshape(per_cell).max(1), shapes, owner, above,
-            gain_above, left_of,
-        )  # fmt: skip
+            outlines,
+            boxes,
+            strips,
+            inside_share,
+            pixel_share.reshape(per_cell).max(1),
+            shapes,
+            owner,
+            above,
+            gain_above,
+            left_of,
+        )
 
 
 def _drawn(

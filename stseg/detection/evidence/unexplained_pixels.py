@@ -51,9 +51,17 @@ class UnexplainedPixels(NamedTuple):
         number, (is_shown, is_open) = lattice.shapes.prod(1), np.empty((2, *lattice.strips.shape[:2]), bool)
         summed_to = np.zeros(rasters.shape[:2], np.uint64)
         pixels = cls(
-            rasters, owners, number.cumsum() - number, lattice.left_of, summed_to, lattice.above, lattice.gain_above,
-            is_shown, is_open, extremes,
-        )  # fmt: skip
+            rasters,
+            owners,
+            number.cumsum() - number,
+            lattice.left_of,
+            summed_to,
+            lattice.above,
+            lattice.gain_above,
+            is_shown,
+            is_open,
+            extremes,
+        )
         _fill_above(pixels, lattice.shapes, lattice.strips)
         return pixels
 

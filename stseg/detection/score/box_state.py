@@ -78,14 +78,26 @@ def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
                     append(fitting, fitted, view * boxes + b, i, gain)
     most = len(fits.item) + 1
     pairs = BoxPairs(
-        np.empty(most), np.empty(most, np.int64), np.empty(most, np.int64),
-        np.zeros(candidates), np.empty(candidates, np.int64), np.zeros(boxes, np.bool_),
-    )  # fmt: skip
+        np.empty(most),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.zeros(candidates),
+        np.empty(candidates, np.int64),
+        np.zeros(boxes, np.bool_),
+    )
     return BoxState(
-        views, boxes, fits, fitting, _hidden_by(evidence.hiders, views, candidates), evidence.hiders,
-        evidence.inside.copy().reshape(-1), missing_cost, np.empty(candidates + 1, np.int64),
-        np.zeros(candidates, np.bool_), pairs,
-    )  # fmt: skip
+        views,
+        boxes,
+        fits,
+        fitting,
+        _hidden_by(evidence.hiders, views, candidates),
+        evidence.hiders,
+        evidence.inside.copy().reshape(-1),
+        missing_cost,
+        np.empty(candidates + 1, np.int64),
+        np.zeros(candidates, np.bool_),
+        pairs,
+    )
 
 
 @kernel

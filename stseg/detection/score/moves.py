@@ -122,9 +122,14 @@ def release(state: SetState) -> None:
 
 @kernel
 def fill_gains(
-    members: Ints, candidates: Ints, problem: DetectionProblem, gains: Floats, view_evidence: Floats, boxes: Ints,
+    members: Ints,
+    candidates: Ints,
+    problem: DetectionProblem,
+    gains: Floats,
+    view_evidence: Floats,
+    boxes: Ints,
     tracks: Ints,
-) -> float:  # fmt: skip
+) -> float:
     """Fill gains (k,) with those of some candidates, int64 (k,), in the set of the members, int64 (n,): nats.
 
     Filled with what `fill_evidence` says of each, of members beside the others, are `view_evidence` float64 (view, k),

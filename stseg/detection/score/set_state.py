@@ -80,12 +80,23 @@ def set_state(problem: DetectionProblem) -> SetState:
         numbers[2 * candidates + 2 + i] = -1
     kept = Kept(numbers, np.zeros(parts + 1), np.zeros(candidates + parts, np.bool_))
     return SetState(
-        problem, _neighbours(problem), pixel_state(problem.pixels, problem.owner), boxes, tracks,
+        problem,
+        _neighbours(problem),
+        pixel_state(problem.pixels, problem.owner),
+        boxes,
+        tracks,
         numbers[: candidates + 1],
-        numbers[candidates + 1 : candidates + 2], numbers[candidates + 2 : 2 * candidates + 2],
-        numbers[2 * candidates + 2 :], np.zeros(1, np.int64), np.zeros(1, np.int64), kept.values[:1],
-        kept.values[1:], kept.flags[:candidates], kept.flags[candidates:], kept,
-    )  # fmt: skip
+        numbers[candidates + 1 : candidates + 2],
+        numbers[candidates + 2 : 2 * candidates + 2],
+        numbers[2 * candidates + 2 :],
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
+        kept.values[:1],
+        kept.values[1:],
+        kept.flags[:candidates],
+        kept.flags[candidates:],
+        kept,
+    )
 
 
 @kernel

@@ -170,8 +170,13 @@ def _patch_score(
     bodies = view.table.boxes_of(pillars.ground[people].reshape(-1, 2), pillars.height[people].reshape(-1))
     match, box = np.empty((len(people), score.shape[1])), assignment.box[k, people]
     fill_own_match(
-        bodies.reshape(*match.shape, 4), observation.edges[box], observation.tolerance[box],
-        observation.belief[box], columns, rows, match,
-    )  # fmt: skip
+        bodies.reshape(*match.shape, 4),
+        observation.edges[box],
+        observation.tolerance[box],
+        observation.belief[box],
+        columns,
+        rows,
+        match,
+    )
     score[people] = np.maximum(match, _MINIMUM_BOX_LOG_LIKELIHOOD)
     return score

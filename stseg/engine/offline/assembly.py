@@ -91,9 +91,15 @@ def _associated(job: Job, finished: Sequence[FinishedSegment]) -> tuple[Stitched
         appearance.append(run.appearance)
     joined = stitcher.joined()
     tracks, identity = finished_tracks(
-        job.read.reduced_rig, job.config, find_tracker(job.tracker), joined.committed, joined.events,
-        np.concatenate(appearance), job.recording.rig, job.known,
-    )  # fmt: skip
+        job.read.reduced_rig,
+        job.config,
+        find_tracker(job.tracker),
+        joined.committed,
+        joined.events,
+        np.concatenate(appearance),
+        job.recording.rig,
+        job.known,
+    )
     return joined, tracks, identity
 
 

@@ -97,9 +97,15 @@ def fill_codebook_log_odds(
                 excess = max(low - ratio, ratio - high, _ZERO) * length
                 flat, line = span + (high - low) * length, span + (_ONE - deep) * low * length
                 if weight[v, u, k] == total and outshines(
-                    _TWO * half * off, _TWO * half * excess * excess, area, flat, line, _ONE, doubt,
+                    _TWO * half * off,
+                    _TWO * half * excess * excess,
+                    area,
+                    flat,
+                    line,
+                    _ONE,
+                    doubt,
                     mimics / (_ONE + half * over * over),  # exp(-z) <= 1 / (1 + z)
-                ):  # fmt: skip
+                ):
                     certain = True
                     break
                 across = half * off

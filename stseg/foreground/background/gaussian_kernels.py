@@ -158,9 +158,16 @@ def _densities(
 
 @wide_kernel
 def adapt_mixture(
-    image: Bytes, gain: Singles, likelihood: Singles, fast: np.float32, slow: np.float32, constants: Adaptation,
-    first: int, step: int, modes: Singles,
-) -> None:  # fmt: skip
+    image: Bytes,
+    gain: Singles,
+    likelihood: Singles,
+    fast: np.float32,
+    slow: np.float32,
+    constants: Adaptation,
+    first: int,
+    step: int,
+    modes: Singles,
+) -> None:
     """Adapt the modes of every `step`-th row from `first` on to a frame, in place; rules of `mixture`.
 
     Parameters
@@ -258,9 +265,15 @@ def _match(offset: Singles, modes: Singles, v: int, match_distance: np.float32, 
 
 @wide_kernel
 def _fill_rate(
-    nearest: Labels, index: np.int32, weight: Singles, likelihood: Singles, fast: np.float32, slow: np.float32,
-    constants: Adaptation, rate: Singles,
-) -> None:  # fmt: skip
+    nearest: Labels,
+    index: np.int32,
+    weight: Singles,
+    likelihood: Singles,
+    fast: np.float32,
+    slow: np.float32,
+    constants: Adaptation,
+    rate: Singles,
+) -> None:
     """Set rate (u,) where the nearest mode is `index`, of weight (u,)."""
     for u in range(len(rate)):
         pace = slow * likelihood[u] + fast * (_ONE - likelihood[u])
@@ -270,9 +283,16 @@ def _fill_rate(
 
 @wide_kernel
 def _adapt(
-    colour: Singles, gain: Singles, nearest: Labels, index: np.int32, offset: Singles, rate: Singles,
-    constants: Adaptation, mode: Singles, v: int,
-) -> None:  # fmt: skip
+    colour: Singles,
+    gain: Singles,
+    nearest: Labels,
+    index: np.int32,
+    offset: Singles,
+    rate: Singles,
+    constants: Adaptation,
+    mode: Singles,
+    v: int,
+) -> None:
     """Move mode `index` (plane, v, u) towards the colours of row v that it matches; elsewhere its weight falls."""
     planes, _, columns = mode.shape
     pace, weight = np.empty(columns, np.float32), mode[planes - 1, v]

@@ -87,10 +87,17 @@ class Observations:
         np.add.at(precision, place[stand_in], self.precision[left_out])
         np.add.at(information, place[stand_in], self.information[left_out])
         return Observations(
-            self.order[chosen], np.append(start, len(chosen)), self.seconds[frames], self.ground[chosen],
-            self.variance[chosen], previous, self.certain[chosen] & (previous >= 0), self.inside[chosen],
-            precision, information,
-        )  # fmt: skip
+            self.order[chosen],
+            np.append(start, len(chosen)),
+            self.seconds[frames],
+            self.ground[chosen],
+            self.variance[chosen],
+            previous,
+            self.certain[chosen] & (previous >= 0),
+            self.inside[chosen],
+            precision,
+            information,
+        )
 
 
 def observe(
@@ -110,11 +117,17 @@ def observe(
     start = np.append(start, len(rows))
     alike = PLACE_ERROR.row_variance(frame_rate)
     return Observations(
-        order, start, frames / frame_rate, ground,
-        np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2), previous,
-        _certain(rows, previous), border.inside(ground, config.detection.border_width), precision,
+        order,
+        start,
+        frames / frame_rate,
+        ground,
+        np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2),
+        previous,
+        _certain(rows, previous),
+        border.inside(ground, config.detection.border_width),
+        precision,
         information,
-    )  # fmt: skip
+    )
 
 
 def _previous(rows: Rows) -> Ints:

@@ -151,10 +151,13 @@ class Visits:
         """The visits after those of some people (person,) before the recording, by sums over these (person, size)."""
         shrink, before = 1.0 / (1.0 + precision * self.lasting), np.full(len(identity), -1)
         return Visits(
-            np.concatenate([identity, self.identity]), np.concatenate([before, self.first]),
-            np.concatenate([before, self.last]), np.concatenate([precision * shrink, self.precision]),
-            np.concatenate([information * shrink, self.information]), self.lasting,
-        )  # fmt: skip
+            np.concatenate([identity, self.identity]),
+            np.concatenate([before, self.first]),
+            np.concatenate([before, self.last]),
+            np.concatenate([precision * shrink, self.precision]),
+            np.concatenate([information * shrink, self.information]),
+            self.lasting,
+        )
 
 
 def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: Floats) -> Visits:
@@ -177,9 +180,13 @@ def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: F
     first, last = frame[order[start]], frame[order[start + count - 1]]
     by_time = np.lexsort((names, first))
     return Visits(
-        names[by_time], first[by_time], last[by_time], (weight.sum(axis=1) * shrink)[by_time],
-        (total.sum(axis=1) * shrink)[by_time], lasting,
-    )  # fmt: skip
+        names[by_time],
+        first[by_time],
+        last[by_time],
+        (weight.sum(axis=1) * shrink)[by_time],
+        (total.sum(axis=1) * shrink)[by_time],
+        lasting,
+    )
 
 
 def lasting_variance(precision: Floats, information: Floats) -> Floats:

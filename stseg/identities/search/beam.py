@@ -44,10 +44,21 @@ class Frames(NamedTuple):
 
 @kernel
 def extend_beam(
-    begin: int, frames: Frames, every_row: ObservedRows, bound_people: BoundPeople, constants: Rules, one: Hypotheses,
-    pasts_of_one: Pasts, other: Hypotheses, pasts_of_other: Pasts, number: int, size: int, counts: Ints, parents: Ints,
+    begin: int,
+    frames: Frames,
+    every_row: ObservedRows,
+    bound_people: BoundPeople,
+    constants: Rules,
+    one: Hypotheses,
+    pasts_of_one: Pasts,
+    other: Hypotheses,
+    pasts_of_other: Pasts,
+    number: int,
+    size: int,
+    counts: Ints,
+    parents: Ints,
     names: Ints,
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int]:
     """Extend hypotheses by some frames, from number `begin` on; the numbers of the new hypotheses and of their pasts.
 
     The hypotheses are `number` in `one`, with `size` pasts in `pasts_of_one`; `other` and `pasts_of_other` are room for
@@ -100,10 +111,19 @@ def _marks(number: int, hypotheses: Hypotheses, people: BoundPeople, first: int)
 
 @kernel
 def _fill_alternatives(
-    hypotheses: Hypotheses, pasts: Pasts, slots: int, k: int, frames: Frames, row_costs: RowCosts,
-    observed: ObservedRows, people: BoundPeople, rules: Rules, extension: Extension, column: Ints,
+    hypotheses: Hypotheses,
+    pasts: Pasts,
+    slots: int,
+    k: int,
+    frames: Frames,
+    row_costs: RowCosts,
+    observed: ObservedRows,
+    people: BoundPeople,
+    rules: Rules,
+    extension: Extension,
+    column: Ints,
     alternatives: Alternatives,
-) -> int:  # fmt: skip
+) -> int:
     """Fill the alternatives of all hypotheses for the rows of the k-th frame, and count them.
 
     Fill the slots of the best assignments, column (hypothesis, row), too.

@@ -120,7 +120,7 @@ def search_identities(
     motion: MotionConfig,
     limits: SearchLimits,
     constraints: Constraints = NO_CONSTRAINTS,
-) -> BestHypothesis:  # fmt: skip
+) -> BestHypothesis:
     """The most likely identity of each observation.
 
     Constraints are pairs of observations. All are obeyed unless they contradict each other.
@@ -159,6 +159,13 @@ def search_identities(
 def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rules:
     """The constants of the search."""
     return Rules(
-        _BIRTH, _ABSENCE, limits.longest, _ALTERNATIVE_LOSS, _BEAM_LOSS, motion.velocity_noise**2,
-        motion.speed_spread**2, sizes.spread, sizes.most_against * sizes.variance,
-    )  # fmt: skip
+        _BIRTH,
+        _ABSENCE,
+        limits.longest,
+        _ALTERNATIVE_LOSS,
+        _BEAM_LOSS,
+        motion.velocity_noise**2,
+        motion.speed_spread**2,
+        sizes.spread,
+        sizes.most_against * sizes.variance,
+    )

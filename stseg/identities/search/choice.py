@@ -34,9 +34,18 @@ class Present(NamedTuple):
 
 @kernel
 def choose_distinct(
-    hypotheses: Hypotheses, pasts: Pasts, column: Ints, first: int, observed: ObservedRows, mark: Ints,
-    every_alternative: Alternatives, total: int, most_loss: float, before: Present, chosen: Ints,
-) -> int:  # fmt: skip
+    hypotheses: Hypotheses,
+    pasts: Pasts,
+    column: Ints,
+    first: int,
+    observed: ObservedRows,
+    mark: Ints,
+    every_alternative: Alternatives,
+    total: int,
+    most_loss: float,
+    before: Present,
+    chosen: Ints,
+) -> int:
     """Choose the best alternatives of different keys, of equally good ones the first; the number of choices.
 
     The hypotheses before are `hypotheses` and `pasts`, with the slot of each row by the best assignment in `column`
@@ -76,9 +85,15 @@ def empty_present(hypotheses: int, slots: int) -> Present:
 
 @part
 def _fill_present(
-    hypotheses: Hypotheses, pasts: Pasts, h: int, column: Ints, first: int, observed: ObservedRows, mark: int,
+    hypotheses: Hypotheses,
+    pasts: Pasts,
+    h: int,
+    column: Ints,
+    first: int,
+    observed: ObservedRows,
+    mark: int,
     present: Present,
-) -> None:  # fmt: skip
+) -> None:
     """Fill the people of a hypothesis, and its key by the best assignment."""
     key, slots = mark, present.name.shape[1]
     for s in range(slots):
@@ -95,7 +110,7 @@ def _fill_present(
 @part
 def _key_of(
     alternatives: Alternatives, a: int, column: Ints, first: int, observed: ObservedRows, present: Present
-) -> int:  # fmt: skip
+) -> int:
     """Key of an alternative: that of the best assignment, with other terms for both rows that change."""
     change, h = alternatives.change, alternatives.change[a, 0]
     key = int(present.key[h])

@@ -111,9 +111,14 @@ class KnownPeople:
         """The same for kernels; start (frame + 1,) is the first observation of each frame."""
         others = np.where(self.other, self.first, -1).max(axis=1, initial=-1)
         return BoundPeople(
-            self.observation, self.person, np.searchsorted(self.observation, start), self.other, self.first, self.last,
+            self.observation,
+            self.person,
+            np.searchsorted(self.observation, start),
+            self.other,
+            self.first,
+            self.last,
             np.maximum(self.last, others),
-        )  # fmt: skip
+        )
 
 
 class BoundPeople(NamedTuple):

@@ -32,7 +32,7 @@ class RowCosts(NamedTuple):
 @kernel
 def row_costs(
     pasts: Pasts, size: int, first: int, rows: int, now: float, observed: ObservedRows, rules: Rules
-) -> RowCosts:  # fmt: skip
+) -> RowCosts:
     """Costs of the rows of a frame, which begin with `first`, as those of some pasts."""
     sizes = len(rules.spread)
     costs = RowCosts(np.empty((size, rows)), np.empty(size, np.int64), np.empty(rows))
@@ -52,9 +52,15 @@ def row_costs(
 
 @part
 def _fill_costs(
-    pasts: Pasts, p: int, first: int, now: float, observed: ObservedRows, rules: Rules, alone: Floats,
+    pasts: Pasts,
+    p: int,
+    first: int,
+    now: float,
+    observed: ObservedRows,
+    rules: Rules,
+    alone: Floats,
     costs: RowCosts,
-) -> None:  # fmt: skip
+) -> None:
     """Fill the costs of rows as those of the p-th past; `alone` (row, size) is the size evidence of new people."""
     since = now - pasts.seconds[p]
     x = pasts.state[p, 0] + since * pasts.state[p, 2]

@@ -45,9 +45,13 @@ def empty_extension(most: int, first: int, rows: int, certain: Flags) -> Extensi
             doubtful[number] = i
             number += 1
     return Extension(
-        np.empty(most + 1, np.int64), np.empty(most + 1, np.int64), np.empty((rows, most + 1)),
-        np.empty(rows, np.int64), np.empty(most + 1, np.bool_), doubtful[:number],
-    )  # fmt: skip
+        np.empty(most + 1, np.int64),
+        np.empty(most + 1, np.int64),
+        np.empty((rows, most + 1)),
+        np.empty(rows, np.int64),
+        np.empty(most + 1, np.bool_),
+        doubtful[:number],
+    )
 
 
 @part

@@ -52,9 +52,19 @@ def slots_in_use(past: Ints, number: int) -> int:
 
 @kernel
 def fill_successors(
-    hypotheses: Hypotheses, pasts: Pasts, size: int, parent: Ints, slot: Ints, slots: int, first: int, now: float,
-    observed: ObservedRows, rules: Rules, successors: Hypotheses, later_pasts: Pasts,
-) -> int:  # fmt: skip
+    hypotheses: Hypotheses,
+    pasts: Pasts,
+    size: int,
+    parent: Ints,
+    slot: Ints,
+    slots: int,
+    first: int,
+    now: float,
+    observed: ObservedRows,
+    rules: Rules,
+    successors: Hypotheses,
+    later_pasts: Pasts,
+) -> int:
     """Fill hypotheses with those before and a frame's rows from `first` on, and number their pasts.
 
     The hypotheses before have `size` pasts. `slots` is the number of slots, and `now` the frame's time; `observed` are
@@ -133,9 +143,13 @@ class Pasts(NamedTuple):
     def empty(cls, number: int, sizes: int) -> Pasts:
         """Room for pasts."""
         return cls(
-            np.empty(number, np.int64), np.empty(number, np.int64), np.empty(number), np.empty((number, 4)),
-            np.empty((number, 3)), *(np.empty((number, sizes)) for _ in range(3)),
-        )  # fmt: skip
+            np.empty(number, np.int64),
+            np.empty(number, np.int64),
+            np.empty(number),
+            np.empty((number, 4)),
+            np.empty((number, 3)),
+            *(np.empty((number, sizes)) for _ in range(3)),
+        )
 
 
 @part

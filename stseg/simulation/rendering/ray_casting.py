@@ -42,9 +42,19 @@ def pixel_boxes(camera: Camera, corners: Floats) -> Ints:
 
 @kernel
 def draw_bodies(
-    rays: Singles, eye: Floats, boxes: Ints, centre: Floats, form: Floats, paint: Floats, lamp: Floats,
-    ids: NDArray[np.uint16], depth: Singles, image: Bytes, instances: NDArray[np.uint16], silhouettes: Ints,
-) -> None:  # fmt: skip
+    rays: Singles,
+    eye: Floats,
+    boxes: Ints,
+    centre: Floats,
+    form: Floats,
+    paint: Floats,
+    lamp: Floats,
+    ids: NDArray[np.uint16],
+    depth: Singles,
+    image: Bytes,
+    instances: NDArray[np.uint16],
+    silhouettes: Ints,
+) -> None:
     """Draw bodies into an image with a depth buffer.
 
     Parameters
