@@ -1,5 +1,6 @@
 """One view of the detector: outlines of the lattice's pillars, and the observation of a frame."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -61,6 +62,10 @@ class ViewObservation:
         values = np.empty_like(self.raster)
         _fill_label_values(self.raster, values)
         return values
+
+
+ViewObservations = Sequence[ViewObservation | None]
+"""One a view, None where it is blind."""
 
 
 class TriedPillars(NamedTuple):
@@ -197,6 +202,10 @@ class PixelView(View):
         wide = pillars.width / WIDTH
         sums, area = sums_inside(self.table, pillars.ground, pillars.height, wide, self.step, values, owner, number)
         return sums * self.config.effective_observations, area / pillars.area_ratio
+
+
+DetectorView = BoxView | PixelView
+"""A view of the detector, by what its camera delivers."""
 
 
 @wide_kernel

@@ -12,7 +12,7 @@ import numpy as np
 
 from stseg.arrays import Flags, ViewEvidence
 from stseg.bodies.box_fit import BoxNoise
-from stseg.bodies.views import BoxView, PixelView, ViewObservation
+from stseg.bodies.views import BoxView, DetectorView, PixelView, ViewObservation, ViewObservations
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.evidence.birth_lattice import lattice
 from stseg.detection.evidence.pixel_lattice import PixelLattice
@@ -40,9 +40,6 @@ from stseg.view_health.view_failures import ViewFailures
 
 _FIRST_FRAME_SEARCHES = 2
 """Searches of a session's first frame from which its rims are learned: the second finds who was missed by the first."""
-
-Observations = Sequence[ViewObservation | None]
-"""One a view, None where it is blind."""
 
 
 class Detector:
@@ -78,7 +75,7 @@ class Detector:
         grid = rig.grid
         self.lattice_ground = lattice(grid, config.lattice_spacing)
         flat = self.lattice_ground.reshape(-1, 2)
-        self.views: list[BoxView | PixelView] = [
+        self.views: list[DetectorView] = [
             BoxView(camera, grid, flat, config, body)
             if kind == "boxes"
             else PixelView(camera, grid, flat, config, body)
@@ -105,11 +102,11 @@ class Detector:
         )
 
     def observe(self, views: Sequence[ViewEvidence], noise: BoxNoise | None = None) -> list[ViewObservation | None]:
-        """Observations of the views under a box noise, by default the first guess; None where a view is blind."""
+        """ViewObservations of the views under a box noise, by default the first guess; None where a view is blind."""
         box_noise = noise or self.first_noise
         return [None if v is None else view.observe(v, box_noise) for view, v in zip(self.views, views, strict=True)]
 
-    def evidence(self, observations: Observations, prior: Prior) -> FrameEvidence:
+    def evidence(self, observations: ViewObservations, prior: Prior) -> FrameEvidence:
         """Evidence of a frame under a prior."""
         return FrameEvidence(self.views, observations, prior, self.parameters, self.pixel_lattice)
 
@@ -137,7 +134,7 @@ class Detector:
         """
         observations, failures = self.observe(views, learned.box_noise.noise), learned.failures
         failures.begin(predicted, self.views, observations)
-        included: Observations = failures.kept(observations)
+        included: ViewObservations = failures.kept(observations)
         is_key = frame % self._key_interval == 0
         if learned.rims.is_young and (is_key or predicted is None) and not self._has_boxes:
             self._learn_first_rims(learned, included, _FIRST_FRAME_SEARCHES if predicted is None else 1)
@@ -162,7 +159,7 @@ class Detector:
         self,
         learned: Estimates,
         is_key: bool,
-        observations: Observations,
+        observations: ViewObservations,
         predicted: PredictedTracks | None,
         proposals: Candidates | None,
     ) -> tuple[Explanation, bool]:
@@ -180,12 +177,12 @@ class Detector:
         return explained_frame(estimate), True
 
     def _evidence(
-        self, observations: Observations, body: BodyConfig, predicted: PredictedTracks | None
+        self, observations: ViewObservations, body: BodyConfig, predicted: PredictedTracks | None
     ) -> FrameEvidence:
         """Evidence of a frame under the prior of its predicted tracks and a population."""
         return self.evidence(observations, Prior.of(predicted, self.config, body, self.border))
 
-    def _learn_first_rims(self, learned: Estimates, observations: Observations, searches: int) -> None:
+    def _learn_first_rims(self, learned: Estimates, observations: ViewObservations, searches: int) -> None:
         """Learn the rims of a young session before its frame is explained, as if births cost nothing.
 
         If what is learned so far leaves much unexplained, a guess of torn masks is tried, too: the rims are those of
@@ -198,13 +195,13 @@ class Detector:
                 likely = max(likely, torn, key=lambda one: mask_log_likelihood(one.pixel_assignment, observations))
             learned.rims.learn(likely.people, self.views, observations)
 
-    def _by_births(self, observations: Observations, learned: Estimates) -> Explanation:
+    def _by_births(self, observations: ViewObservations, learned: Estimates) -> Explanation:
         """A frame's explanation without tracks."""
         evidence = self._evidence(observations, learned.population.body, None)
         return explained_frame(self._search.whole(self._search.of_tracks(evidence)))
 
     def _with_excluded_residuals(
-        self, explanation: Explanation, observations: Observations, excluded: Flags
+        self, explanation: Explanation, observations: ViewObservations, excluded: Flags
     ) -> Explanation:
         """A frame's explanation with the residuals of excluded views, too: a camera that was moved shows in them."""
         people = explanation.people

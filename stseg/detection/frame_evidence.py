@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from stseg.arrays import Floats, Singles
-from stseg.bodies.views import BoxView, PixelView, ViewObservation
+from stseg.bodies.views import BoxView, DetectorView, PixelView, ViewObservations
 from stseg.detection.evidence.blob_scale import blob_scales
 from stseg.detection.evidence.box_lattice import BoxLattice
 from stseg.detection.evidence.candidate_evidence import ProjectedBodies, box_evidence, pixel_evidence, stacked_rasters
@@ -24,8 +24,8 @@ class FrameEvidence:
     `lattice` has the birth lattice's pillars in the views that deliver pixels.
     """
 
-    views: Sequence[BoxView | PixelView]
-    observations: Sequence[ViewObservation | None]
+    views: Sequence[DetectorView]
+    observations: ViewObservations
     prior: Prior
     parameters: ScoreParameters
     lattice: PixelLattice

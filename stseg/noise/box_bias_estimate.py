@@ -25,7 +25,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Floats, ViewEvidence
 from stseg.bodies.box_fit import EDGE_GRAIN, LOWER_EDGE_BELOW, MIDDLE_OFFSET, fill_offsets
-from stseg.bodies.views import View, ViewObservation
+from stseg.bodies.views import View, ViewObservations
 from stseg.config import ErrorRateConfig
 from stseg.noise.box_noise_estimate import explained_boxes, whole_boxes
 from stseg.records.forgetting import Forgetting
@@ -77,9 +77,7 @@ class BoxBiasEstimate:
         pairs = zip(evidence, sizes, strict=True)
         return [_corrected(view, bias, size) if isinstance(view, Boxes) else view for view, size in pairs]
 
-    def learn(
-        self, explanation: Explanation, views: Sequence[View], observations: Sequence[ViewObservation | None]
-    ) -> None:
+    def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count the frame whose boxes were corrected last."""
         self.offsets.forget()
         people = explanation.people

@@ -28,7 +28,7 @@ from stseg.bodies.box_fit import (
     fill_offsets,
     knots_of,
 )
-from stseg.bodies.views import BoxView, View, ViewObservation
+from stseg.bodies.views import BoxView, View, ViewObservations
 from stseg.config import ErrorRateConfig
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation, People
@@ -71,9 +71,7 @@ class BoxNoiseEstimate:
         spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
         return BoxNoise(np.minimum(spread, PRIOR_NOISE.spread), self._scale)
 
-    def learn(
-        self, explanation: Explanation, views: Sequence[View], observations: Sequence[ViewObservation | None]
-    ) -> None:
+    def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count one frame."""
         self.offsets.forget()
         for k, person, edges, score in explained_boxes(explanation, views, observations, self._config):
@@ -87,10 +85,7 @@ class BoxNoiseEstimate:
 
 
 def explained_boxes(
-    explanation: Explanation,
-    views: Sequence[View],
-    observations: Sequence[ViewObservation | None],
-    config: ErrorRateConfig,
+    explanation: Explanation, views: Sequence[View], observations: ViewObservations, config: ErrorRateConfig
 ) -> Iterator[tuple[int, Ints, Floats, Floats]]:
     """Whole boxes of people that the other views support: for each view its number, people, edges and scores."""
     people = explanation.people

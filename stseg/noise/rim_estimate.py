@@ -28,7 +28,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
 from stseg.bodies.outlines import WHOLE_SHARE, Spans, paint_outlines
-from stseg.bodies.views import PixelView, View, ViewObservation
+from stseg.bodies.views import PixelView, View, ViewObservation, ViewObservations
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.kernels.accelerate import kernel, part
 from stseg.noise.torn_masks import TORN_RATES, with_rates
@@ -101,18 +101,16 @@ class RimEstimate:
         total = self.shares.sums.sum(0) + _PRIOR_WEIGHT * np.array([1.0, self._miss, self._miss])
         return np.asarray(total / total[0])
 
-    def applied(self, observations: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
+    def applied(self, observations: ViewObservations) -> list[ViewObservation | None]:
         """The observations of all views without the withdrawn share of their rims, by the rates of torn masks."""
         return self._by(self.withdrawn, self.torn, observations)
 
-    def torn_guess(self, observations: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
+    def torn_guess(self, observations: ViewObservations) -> list[ViewObservation | None]:
         """The same without any rim, by a guess of the rates of torn masks."""
         number = len(observations)
         return self._by(np.ones(number), np.tile(TORN_RATES, (number, 1)), observations)
 
-    def _by(
-        self, withdrawn: Floats, rates: Floats, observations: Sequence[ViewObservation | None]
-    ) -> list[ViewObservation | None]:
+    def _by(self, withdrawn: Floats, rates: Floats, observations: ViewObservations) -> list[ViewObservation | None]:
         """Observations without shares (view,) of their rims, by rates (view, 2)."""
         usual = self._miss, self._clutter
         return [
@@ -125,7 +123,7 @@ class RimEstimate:
         self.shares.skip_frame()
         self.clutter.skip_frame()
 
-    def learn(self, people: People, views: Sequence[View], observations: Sequence[ViewObservation | None]) -> None:
+    def learn(self, people: People, views: Sequence[View], observations: ViewObservations) -> None:
         """Count one frame."""
         self.shares.forget()
         self.clutter.forget()

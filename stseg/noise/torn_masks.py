@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import xlogy
 
 from stseg.arrays import Shorts
-from stseg.bodies.views import ViewObservation
+from stseg.bodies.views import ViewObservation, ViewObservations
 
 TORN_RATES = (0.5, 0.02)
 """Guess of the rates of misses and clutter of torn masks."""
@@ -34,7 +34,7 @@ def with_rates(observation: ViewObservation, usual: tuple[float, float], rates: 
     return replace(observation, raster=np.log(body / empty).astype(np.float32))
 
 
-def is_unexplained(assignment: Sequence[Shorts], observations: Sequence[ViewObservation | None]) -> bool:
+def is_unexplained(assignment: Sequence[Shorts], observations: ViewObservations) -> bool:
     """Whether more of the foreground lies outside the outlines of people than limbs that are no part of a pillar.
 
     `assignment` are int16 arrays (v, u): the person at each raster pixel of a view, -1 for none.
@@ -44,7 +44,7 @@ def is_unexplained(assignment: Sequence[Shorts], observations: Sequence[ViewObse
     return bool(outside > _LARGEST_UNEXPLAINED * sum(np.count_nonzero(found) for _, found in pairs))
 
 
-def mask_log_likelihood(assignment: Sequence[Shorts], observations: Sequence[ViewObservation | None]) -> float:
+def mask_log_likelihood(assignment: Sequence[Shorts], observations: ViewObservations) -> float:
     """Log likelihood of the masks of all views by the best rates of each, nats; `assignment` as of `is_unexplained`."""
     total = 0.0
     for people, view in zip(assignment, observations, strict=True):

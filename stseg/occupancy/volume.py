@@ -118,11 +118,7 @@ class Occupancy:
         return self._volume(fused)
 
     def _fused(
-        self,
-        evidence: Sequence[ViewEvidence],
-        explanation: Explanation,
-        rates: Sequence[ErrorRates],
-        noise: BoxNoise,
+        self, evidence: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[ErrorRates], noise: BoxNoise
     ) -> _Fused:
         near_person = nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
         views = [

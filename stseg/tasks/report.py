@@ -95,12 +95,7 @@ def report(
 
 
 def require_outputs(
-    output: Path | None,
-    pictures: Path | None,
-    video: Path | None,
-    frames: str | None,
-    overwrite: bool,
-    inputs: Inputs,
+    output: Path | None, pictures: Path | None, video: Path | None, frames: str | None, overwrite: bool, inputs: Inputs
 ) -> None:
     """Refuse outputs that cannot be written and options without effect, before any work."""
     if output is None and video is None:

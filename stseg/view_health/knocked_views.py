@@ -25,7 +25,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.bodies.outlines import WHOLE_SHARE, Spans
-from stseg.bodies.views import BoxView, PixelView, ViewObservation
+from stseg.bodies.views import DetectorView, ViewObservations
 from stseg.config import BodyConfig, ErrorRateConfig
 from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
@@ -86,10 +86,7 @@ class KnockedViews:
         self.recent = Forgetting((views, 2), frame_rate, _RECENT_MEMORY, _RECENT_FRAMES)
 
     def compare(
-        self,
-        predicted: PredictedTracks,
-        views: Sequence[BoxView | PixelView],
-        observations: Sequence[ViewObservation | None],
+        self, predicted: PredictedTracks, views: Sequence[DetectorView], observations: ViewObservations
     ) -> None:
         """Count the next frame, before it is explained: the share of predicted people that each view shows."""
         detected = predicted.existence > 0
@@ -140,7 +137,7 @@ def _mean(sums: Floats) -> Floats:
 class _ExpectedPeople:
     """Predicted people within one view's image, and its foreground, bool (v, u); none where the view is blind."""
 
-    def __init__(self, bodies: Candidates, view: BoxView | PixelView, foreground: Flags | None) -> None:
+    def __init__(self, bodies: Candidates, view: DetectorView, foreground: Flags | None) -> None:
         visible = bodies if foreground is not None else bodies.at(np.zeros(0, np.int64))
         first, spans, area = view.whole_outlines(visible.ground, visible.height, visible.width)
         self._outlines = first, spans, np.zeros((0, 0), bool) if foreground is None else foreground

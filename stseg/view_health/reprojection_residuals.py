@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.bodies.views import BoxView, PixelView, View, ViewObservation
+from stseg.bodies.views import DetectorView, PixelView, View, ViewObservation, ViewObservations
 from stseg.records.candidates import Candidates
 
 _GREATEST_RESIDUAL, _RESIDUAL_STEP = 0.6, 0.05
@@ -20,10 +20,7 @@ _SHIFTS = np.arange(-_GREATEST_RESIDUAL, _GREATEST_RESIDUAL + _RESIDUAL_STEP / 2
 
 
 def reprojection_residuals(
-    people: Candidates,
-    views: Sequence[BoxView | PixelView],
-    observations: Sequence[ViewObservation | None],
-    boxes: list[Ints],
+    people: Candidates, views: Sequence[DetectorView], observations: ViewObservations, boxes: list[Ints]
 ) -> Floats:
     """Mean residual of each view.
 
@@ -66,7 +63,7 @@ def _middles(edges: Floats) -> Floats:
     return (edges[:, :2] + edges[:, 2:]) / 2
 
 
-def _of_view(people: Candidates, view: BoxView | PixelView, observation: ViewObservation, owner: Ints) -> Floats:
+def _of_view(people: Candidates, view: DetectorView, observation: ViewObservation, owner: Ints) -> Floats:
     """Residual of each person, float64 (n,), metres; nan for those that overlap others."""
     found = np.full(len(people), np.nan)
     right = _right(people.ground, view)

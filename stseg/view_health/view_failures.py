@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Flags, Ints
-from stseg.bodies.views import BoxView, PixelView, ViewObservation
+from stseg.bodies.views import DetectorView, ViewObservations
 from stseg.config import BodyConfig, ErrorRateConfig
 from stseg.kernels.accelerate import kernel
 from stseg.records.forgetting import Forgetting
@@ -110,22 +110,14 @@ class ViewFailures:
         return [None if excluded else view for excluded, view in zip(self.excluded, inputs, strict=True)]
 
     def begin(
-        self,
-        predicted: PredictedTracks | None,
-        views: Sequence[BoxView | PixelView],
-        observations: Sequence[ViewObservation | None],
+        self, predicted: PredictedTracks | None, views: Sequence[DetectorView], observations: ViewObservations
     ) -> None:
         """Exclude views from the next frame, before it is explained; `observations` are those of all views."""
         if predicted is not None:
             self.knocks.compare(predicted, views, observations)
         self.excluded = self.failing | self.knocks.knocked
 
-    def learn(
-        self,
-        explanation: Explanation,
-        views: Sequence[BoxView | PixelView],
-        observations: Sequence[ViewObservation | None],
-    ) -> bool:
+    def learn(self, explanation: Explanation, views: Sequence[DetectorView], observations: ViewObservations) -> bool:
         """Count one frame by its explanation; whether more views are excluded from it now."""
         people = explanation.people
         evidence = np.nan_to_num(people.view_evidence)

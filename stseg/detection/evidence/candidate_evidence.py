@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Singles
 from stseg.bodies.box_fit import fill_inside, fill_match
-from stseg.bodies.views import BoxView, PixelView, View, ViewObservation
+from stseg.bodies.views import BoxView, PixelView, View, ViewObservations
 from stseg.detection.evidence.occlusion import hiders_of
 from stseg.detection.problem import BoxEvidence, PixelEvidence, no_rows
 from stseg.records.candidates import Candidates
@@ -64,10 +64,7 @@ class ProjectedBodies:
 
 
 def box_evidence(
-    views: Sequence[View],
-    observations: Sequence[ViewObservation | None],
-    bodies: ProjectedBodies,
-    base: BoxEvidence | None = None,
+    views: Sequence[View], observations: ViewObservations, bodies: ProjectedBodies, base: BoxEvidence | None = None
 ) -> BoxEvidence:
     """Evidence of all views that deliver boxes; a blind one (None) has the candidates outside its image.
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Shorts, Singles
-from stseg.bodies.views import PixelView, View, ViewObservation
+from stseg.bodies.views import PixelView, View, ViewObservations
 from stseg.config import BodyConfig
 from stseg.detection.search.refine import EvidenceAssignment, RefinedPlaces
 from stseg.records.sizes import Sizes, log_heavy_tailed
@@ -40,7 +40,7 @@ def body_sizes(
     places: RefinedPlaces,
     width: Floats,
     views: Sequence[View],
-    observations: Sequence[ViewObservation | None],
+    observations: ViewObservations,
     assignment: EvidenceAssignment,
     body: BodyConfig,
 ) -> Sizes:

@@ -52,14 +52,7 @@ def row_costs(
 
 @part
 def _fill_costs(
-    pasts: Pasts,
-    p: int,
-    first: int,
-    now: float,
-    observed: ObservedRows,
-    rules: Rules,
-    alone: Floats,
-    costs: RowCosts,
+    pasts: Pasts, p: int, first: int, now: float, observed: ObservedRows, rules: Rules, alone: Floats, costs: RowCosts
 ) -> None:
     """Fill the costs of rows as those of the p-th past; `alone` (row, size) is the size evidence of new people."""
     since = now - pasts.seconds[p]
