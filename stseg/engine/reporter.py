@@ -8,6 +8,10 @@ from typing import Protocol
 
 Progress = Callable[[str, int, int | None], None]
 """Called with the kind of work in one word, frames done, and frames in all (None where not known)."""
+Advance = Callable[[int], None]
+"""Called with a number of further frames."""
+Note = Callable[[str], None]
+"""Called with a line about the work."""
 
 
 class Reporter(Protocol):
@@ -16,7 +20,7 @@ class Reporter(Protocol):
     def note(self, line: str) -> None:
         """A line about the run."""
 
-    def progress(self, work: str, total: int | None, done: int = 0) -> AbstractContextManager[Callable[[int], None]]:
+    def progress(self, work: str, total: int | None, done: int = 0) -> AbstractContextManager[Advance]:
         """Progress of one kind of work, in frames; the context's value is called with each number of further frames.
 
         Parameters
@@ -39,7 +43,7 @@ class LogReporter:
         logging.getLogger("stseg").info("%s", line)
 
     @contextmanager
-    def progress(self, work: str, total: int | None, done: int = 0) -> Iterator[Callable[[int], None]]:
+    def progress(self, work: str, total: int | None, done: int = 0) -> Iterator[Advance]:
         """Progress of one kind of work (`Reporter.progress`)."""
         count = done
 
@@ -52,6 +56,10 @@ class LogReporter:
         yield advance
 
 
-def reporter_of(progress: Progress | Reporter | None) -> Reporter:
+AnyReporter = Progress | Reporter | None
+"""A reporter, a function that is called with progress alone, or neither."""
+
+
+def reporter_of(progress: AnyReporter) -> Reporter:
     """A reporter as it is; or one that logs notes, and reports progress to a function, if there is one."""
     return LogReporter(progress) if progress is None or callable(progress) else progress

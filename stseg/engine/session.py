@@ -28,6 +28,7 @@ from stseg.engine.committed_frames import (
     within_area,
 )
 from stseg.engine.pipeline import Pipeline
+from stseg.engine.reporter import Advance
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
@@ -180,7 +181,7 @@ def run_session(
     foregrounds: Sequence[ViewForeground],
     frame_sets: Iterable[FrameSet],
     first: int,
-    advance: Callable[[int], None],
+    advance: Advance,
     cores: Callable[[], int] = two_cores,
     factors: Sequence[int] | None = None,
 ) -> Iterator[CommittedFrames]:

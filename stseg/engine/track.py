@@ -12,11 +12,11 @@ from stseg.config.keys import require_effect
 from stseg.engine.memory import ground_note, require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.detector_sources import with_boxes
-from stseg.engine.offline.frame_range import FrameRange, resolve_frames
+from stseg.engine.offline.frame_range import FrameRange, FrameSpan, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.known import digest, read_known
 from stseg.engine.recordings import AnySource, config_of, recording_of
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.reporter import AnyReporter, Reporter, reporter_of
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workers.workforce import Workforce
 from stseg.errors import ConfigError
@@ -39,14 +39,14 @@ def track(
     output: Path | str | None = None,
     *,
     sources: Mapping[str, AnySource] | None = None,
-    frames: tuple[int | None, int | None] | None = None,
+    frames: FrameSpan = None,
     tracker: str = "cut",
     config: Config | Path | str | None = None,
     workers: int | None = 1,
     volume: VolumeKind = "all",
     known: Path | str | None = None,
     overwrite: bool = False,
-    progress: Progress | Reporter | None = None,
+    progress: AnyReporter = None,
 ) -> Run:
     """Track the people of a recording, as `stseg run` does.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from stseg.engine.offline.detector_sources import with_boxes
 from stseg.engine.recordings import recording_of
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.reporter import AnyReporter, reporter_of
 from stseg.errors import SourceError
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import HOG, CameraSource, Recording
@@ -22,7 +22,7 @@ def detect(
     classes: Sequence[str] = (),
     score: float | None = None,
     overwrite: bool = False,
-    progress: Progress | Reporter | None = None,
+    progress: AnyReporter = None,
 ) -> Recording:
     """Find people in the videos of a recording, as `stseg detect` does.
 

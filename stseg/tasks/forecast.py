@@ -14,12 +14,12 @@ from stseg.config import Config
 from stseg.config.keys import require_effect
 from stseg.engine.memory import require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
-from stseg.engine.offline.frame_range import FrameRange, resolve_frames
+from stseg.engine.offline.frame_range import FrameRange, FrameSpan, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
 from stseg.engine.recordings import config_of, recording_of
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.reporter import AnyReporter, reporter_of
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workers.workforce import Workforce
 from stseg.io.machine import free_cores
@@ -70,12 +70,12 @@ class Forecast:
 def plan(
     rig: Path | str | Recording,
     *,
-    frames: tuple[int | None, int | None] | None = None,
+    frames: FrameSpan = None,
     config: Config | Path | str | None = None,
     tracker: str = "cut",
     volume: VolumeKind = "all",
     workers: int | None = None,
-    progress: Progress | Reporter | None = None,
+    progress: AnyReporter = None,
 ) -> Forecast:
     """Forecast the time of a run and the size of its file, as `stseg plan` does.
 

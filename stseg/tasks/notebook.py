@@ -5,7 +5,8 @@ from html import escape
 from pathlib import Path
 
 from stseg.arrays import Bytes
-from stseg.engine.reporter import Progress, Reporter
+from stseg.engine.offline.frame_range import FrameSpan
+from stseg.engine.reporter import AnyReporter
 from stseg.io.runfile.runs import Run
 from stseg.reporting.figures import ground_figures
 from stseg.reporting.page.html import data_uri, png_bytes
@@ -50,12 +51,7 @@ def summary_html(run: Run) -> str:
 
 
 def write_film(
-    run: Run,
-    output: Path | str,
-    frames: tuple[int | None, int | None] | None,
-    camera_images: bool,
-    overwrite: bool,
-    progress: Progress | Reporter | None,
+    run: Run, output: Path | str, frames: FrameSpan, camera_images: bool, overwrite: bool, progress: AnyReporter
 ) -> FilmFile:
     """Write the film of a run, as `stseg report --video` does."""
     return FilmFile(

@@ -8,9 +8,9 @@ import numpy as np
 from stseg.arrays import Bytes, Ints, Observation, Rows, Singles
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
-from stseg.engine.offline.frame_range import frames_of_run
+from stseg.engine.offline.frame_range import FrameSpan, frames_of_run
 from stseg.engine.recordings import run_of
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.reporter import AnyReporter, Reporter, reporter_of
 from stseg.errors import SourceError
 from stseg.io.config_file import parse_config
 from stseg.io.outputs.label_images import LabelImages
@@ -32,11 +32,11 @@ def label_images(
     run: Run | Path | str,
     folder: Path | str,
     *,
-    frames: tuple[int | None, int | None] | None = None,
+    frames: FrameSpan = None,
     config: Config | None = None,
     changes: Sequence[str] = (),
     overwrite: bool = False,
-    progress: Progress | Reporter | None = None,
+    progress: AnyReporter = None,
 ) -> int:
     """Write the track id of every pixel of every camera as images, as `stseg labels` does.
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Bytes, Ints, Observation
-from stseg.engine.offline.frame_range import frames_of_run
+from stseg.engine.offline.frame_range import FrameSpan, frames_of_run
 from stseg.engine.recordings import run_of
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.reporter import AnyReporter, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
 from stseg.io.outputs.video_writer import require_film_name, write_film
@@ -36,11 +36,11 @@ def report(
     frame: Sequence[int] = (),
     pictures: Path | str | None = None,
     video: Path | str | None = None,
-    frames: tuple[int | None, int | None] | None = None,
+    frames: FrameSpan = None,
     camera_images: bool = False,
     names: Path | str | None = None,
     overwrite: bool = False,
-    progress: Progress | Reporter | None = None,
+    progress: AnyReporter = None,
 ) -> list[Path]:
     """Write a run as an HTML page that needs no other file, or as a film, as `stseg report` does.
 
@@ -137,14 +137,7 @@ def write_report(
     return [output, *write_figures(pictures, still, overwrite, inputs)]
 
 
-def film(
-    run: Run,
-    output: Path,
-    frames: tuple[int | None, int | None] | None,
-    camera_images: bool,
-    reporter: Reporter,
-    overwrite: bool,
-) -> int:
+def film(run: Run, output: Path, frames: FrameSpan, camera_images: bool, reporter: Reporter, overwrite: bool) -> int:
     """Write the film, see `report`; the number of its frames."""
     numbers = frames_of_run(run, frames)
     drawn = RunFilm(run.recording.rig, run.views, run.trajectory)

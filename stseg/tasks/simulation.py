@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.reporter import AnyReporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
@@ -43,7 +43,7 @@ def simulate(
     spoil: Sequence[str] = (),
     instances: bool = False,
     overwrite: bool = False,
-    progress: Progress | Reporter | None = None,
+    progress: AnyReporter = None,
     **changes: Any,
 ) -> SimulatedRecording:
     """Render a simulated scene, as `stseg simulate` does: videos, masks, boxes, rig files and truth.

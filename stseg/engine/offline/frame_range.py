@@ -12,6 +12,9 @@ from stseg.io.runfile.runs import Run
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import abbreviated, parse_whole
 
+FrameSpan = tuple[int | None, int | None] | None
+"""First and stop, half open; None for the recording's first frame and its end, or for all frames."""
+
 
 class FrameRange(NamedTuple):
     """Frames first .. stop - 1; None for the recording's first frame, and for its end."""
@@ -53,7 +56,7 @@ def resolve_frames(frames: FrameRange | None, streams: StreamIndex, recording: R
     return first, stop
 
 
-def frames_of_run(run: Run, frames: tuple[int | None, int | None] | None) -> Ints:
+def frames_of_run(run: Run, frames: FrameSpan) -> Ints:
     """Frame numbers of a part of a run, all of the run's by default, int64 (n,).
 
     Raises

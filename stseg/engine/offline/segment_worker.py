@@ -10,6 +10,7 @@ from stseg.engine.offline.backgrounds import BackgroundFrames, background_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
+from stseg.engine.reporter import Advance
 from stseg.engine.session import run_session, two_cores
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import open_frames
@@ -37,7 +38,7 @@ class SegmentWorker:
         self._learned = list[ViewForeground]()
         self._learned_from: BackgroundFrames | None = None
 
-    def make(self, segment: Segment, draft: Path, advance: Callable[[int], None]) -> Path:
+    def make(self, segment: Segment, draft: Path, advance: Advance) -> Path:
         """Track a segment and write its file.
 
         Parameters

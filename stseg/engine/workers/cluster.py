@@ -13,11 +13,12 @@ from pathlib import Path
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
+from stseg.engine.reporter import Advance
 from stseg.errors import ConfigError, WorkerError
 
 
 def make_by_cluster(
-    job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], address: str, advance: Callable[[int], None]
+    job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], address: str, advance: Advance
 ) -> Iterator[tuple[Segment, Path]]:
     """Process segments by the workers of a scheduler, in the order in which they finish.
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
+from stseg.engine.reporter import Advance, Note
 from stseg.engine.workers.worker_processes import CONTEXT, GUARD, started_process
 from stseg.errors import StsegError, WorkerError
 from stseg.io.machine import free_cores
@@ -43,12 +44,7 @@ class _Worker:
 
 
 def make_by_workers(
-    job: Job,
-    missing: Sequence[Segment],
-    draft: Callable[[int], Path],
-    workers: int,
-    advance: Callable[[int], None],
-    note: Callable[[str], None],
+    job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], workers: int, advance: Advance, note: Note
 ) -> Iterator[tuple[Segment, Path]]:
     """Process segments by worker processes, in the order in which they finish.
 

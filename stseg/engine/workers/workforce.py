@@ -11,6 +11,7 @@ from stseg.engine.offline.calls import Caller, called_beside, called_here
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
+from stseg.engine.reporter import Advance, Note
 from stseg.engine.workers.cluster import make_by_cluster
 from stseg.engine.workers.local_workers import make_by_workers
 from stseg.engine.workers.worker_processes import FORKED, GUARD, prepare_workers, processes_that_fit
@@ -48,18 +49,13 @@ class Workforce:
         if self.scheduler is None:
             prepare_workers(self.workers)
 
-    def caller(self, job: Job, note: Callable[[str], None]) -> Caller:
+    def caller(self, job: Job, note: Note) -> Caller:
         """Caller of a function for which this process need not wait; `note` is called with lines about the work."""
         several = self.scheduler is None and self.processes(job) > 1
         return partial(called_beside, note) if several and FORKED else called_here
 
     def make(
-        self,
-        job: Job,
-        missing: Sequence[Segment],
-        draft: Callable[[int], Path],
-        advance: Callable[[int], None],
-        note: Callable[[str], None],
+        self, job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], advance: Advance, note: Note
     ) -> Iterator[tuple[Segment, Path]]:
         """Segments and their files, in the order in which they are finished.
 

@@ -15,8 +15,8 @@ from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measur
 from stseg.calibration.automatic.solution import CalibrationInput, SolvedViews
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
-from stseg.engine.offline.frame_range import FrameRange
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.offline.frame_range import FrameRange, FrameSpan
+from stseg.engine.reporter import AnyReporter, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Grid, Rig
@@ -30,7 +30,7 @@ from stseg.io.recording.video.ffmpeg import read_frame_rate, read_video_size
 
 Distance = tuple[str, float, float, float, float, float]
 """A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""
-Frames = tuple[int | None, int | None] | None
+Frames = FrameSpan
 _UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
@@ -77,12 +77,12 @@ def calibrate_auto(
     person_height: float = 1.7,
     distances: Sequence[Distance] = (),
     most_delay: float = 2.0,
-    frames: Frames = None,
+    frames: FrameSpan = None,
     background: str | None = None,
     source_kind: Literal["video", "masks"] = "video",
     cell: float = Grid.cell,
     overwrite: bool = False,
-    progress: Progress | Reporter | None = None,
+    progress: AnyReporter = None,
 ) -> AutomaticCalibration:
     """Make a rig file from videos alone, as `stseg calibrate auto` does.
 
@@ -157,7 +157,7 @@ def calibrate_auto(
 
 
 def people_of(
-    streams: Recording, frames: Frames, person_height: float, most_delay: float, reporter: Reporter
+    streams: Recording, frames: FrameSpan, person_height: float, most_delay: float, reporter: Reporter
 ) -> tuple[CalibrationInput, list[Bytes]]:
     """Feet and heads of the isolated people of a recording, and the empty scene in each view where there are images."""
     counted = index_streams(streams)
@@ -239,7 +239,7 @@ def _require_ground(solution: SolvedViews, known: Sequence[KnownDistance]) -> No
             raise ConfigError("--distance", str(number), "a pixel that shows no ground", "pixels where people walk")
 
 
-def _frame_range(frames: Frames, length: int) -> tuple[int, int]:
+def _frame_range(frames: FrameSpan, length: int) -> tuple[int, int]:
     given = FrameRange(*(frames or (0, min(length, _DEFAULT_FRAMES))))
     first, stop = given.first or 0, length if given.stop is None else min(given.stop, length)
     if not first < stop:

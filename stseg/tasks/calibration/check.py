@@ -13,8 +13,9 @@ from stseg.calibration.check.rig_check import check_rig as check_boxes
 from stseg.calibration.check.verdict import Disagreement
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
+from stseg.engine.offline.frame_range import FrameSpan
 from stseg.engine.recordings import recording_of
-from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.reporter import AnyReporter, reporter_of
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry.sampling import Sampling
 from stseg.io.outputs.whole_files import Inputs, require_output, write_page
@@ -117,12 +118,7 @@ class RigCheck:
         return len(write_figures(folder, self.pictures, overwrite, Inputs(recording_files(self.recording))))
 
 
-def check_rig(
-    rig: Path | str | Recording,
-    *,
-    frames: tuple[int | None, int | None] | None = None,
-    progress: Progress | Reporter | None = None,
-) -> RigCheck:
+def check_rig(rig: Path | str | Recording, *, frames: FrameSpan = None, progress: AnyReporter = None) -> RigCheck:
     """Check each view of a rig against the others by the people in its recording, as `stseg calibrate check` does.
 
     Parameters
@@ -164,7 +160,7 @@ def check_rig(
     return RigCheck(recording, check, tuple(verdict_text(recording.rig, check)), *middle)
 
 
-def _frame_range(frames: tuple[int | None, int | None] | None) -> tuple[int, int]:
+def _frame_range(frames: FrameSpan) -> tuple[int, int]:
     begin, end = frames or (None, None)
     first = begin or 0
     stop = first + DEFAULT_FRAMES if end is None else end
