@@ -83,6 +83,10 @@ class Detections:
         return {str(names[k]): int(counts[k]) for k in np.argsort(-counts, kind="stable")}
 
 
+Values = Sequence[object]
+"""Values of a file, still to be checked."""
+
+
 class DetectionList:
     """Collects detections of a file one by one, and refuses what is no box."""
 
@@ -96,13 +100,7 @@ class DetectionList:
         return len(self._numbers)
 
     def add(
-        self,
-        place: str,
-        frame: int,
-        box: Sequence[object],
-        score: object = 1.0,
-        label: str = "",
-        mask: Mask | None = None,
+        self, place: str, frame: int, box: Values, score: object = 1.0, label: str = "", mask: Mask | None = None
     ) -> None:
         """Add a detection: left, top, width, height in pixels; `place` is where it stands in the file."""
         values = (number(self._path, place, "box", one) for one in ([box] if isinstance(box, str) else box))
@@ -121,13 +119,7 @@ class DetectionList:
         self._mask.append(mask)
 
     def add_corners(
-        self,
-        place: str,
-        frame: int,
-        corners: Sequence[object],
-        score: object = 1.0,
-        label: str = "",
-        mask: Mask | None = None,
+        self, place: str, frame: int, corners: Values, score: object = 1.0, label: str = "", mask: Mask | None = None
     ) -> None:
         """Add a detection by its left, top, right and bottom edges."""
         if len(corners) != 4 or isinstance(corners, str):

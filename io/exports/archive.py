@@ -103,37 +103,21 @@ def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:
     yield "recordings", [(*about, grid.x[0], grid.y[0], grid.x[1], grid.y[1], len(run.tracks), people)]
     lengths = _path_lengths(run.trajectory)
     yield "tracks", (_track(run, name, row, lengths.get(int(row["id"]), 0.0)) for row in run.tracks)
-    yield (
-        "events",
-        (
-            (
-                name,
-                int(e["frame"]),
-                int(e["frame"]) / rate,
-                e["kind"].decode(errors="replace"),
-                int(e["id"]),
-                int(e["other"]),
-                e["reason"].decode(errors="replace"),
-            )
-            for e in run.events
-        ),
-    )
-    yield (
-        "trajectory",
-        (
-            (
-                name,
-                int(r["frame"]),
-                int(r["frame"]) / rate,
-                int(r["id"]),
-                float(r["x"]),
-                float(r["y"]),
-                _finite(r["height"]),
-                _finite(r["score"]),
-            )
-            for r in run.trajectory
-        ),
-    )
+    yield "events", _event_rows(run, name)
+    yield "trajectory", _place_rows(run, name)
+
+
+def _event_rows(run: Run, recording: str) -> Iterator[tuple[object, ...]]:
+    for event in run.events:
+        kind, reason = (event[name].decode(errors="replace") for name in ("kind", "reason"))
+        frame = int(event["frame"])
+        yield recording, frame, frame / run.frame_rate, kind, int(event["id"]), int(event["other"]), reason
+
+
+def _place_rows(run: Run, recording: str) -> Iterator[tuple[object, ...]]:
+    for row in run.trajectory:
+        frame, height, score = int(row["frame"]), _finite(row["height"]), _finite(row["score"])
+        yield recording, frame, frame / run.frame_rate, int(row["id"]), float(row["x"]), float(row["y"]), height, score
 
 
 def _path_lengths(trajectory: Rows) -> dict[int, float]:

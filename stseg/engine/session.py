@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 
 import numpy as np
 
@@ -117,7 +118,7 @@ class Session:
             reason = f"{explanation.unfinished} candidates interact: not searched to the end"
             events = np.append(events, np.array([(frame, b"crowd", 0, 0, reason.encode())], EVENT))
         used = failures.kept(evidence)
-        fusion = self._submit(frame, used, explanation, noise)
+        fusion = self._submit(partial(self._fuse, frame, used, explanation, noise))
         with self.watch.time("appearance"):
             appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, used, frame_set.images)
         shifts = self._shifts.pop(frame, np.zeros(0, SHIFT))
@@ -136,16 +137,14 @@ class Session:
     def _committed(self, commit: Commit) -> CommittedFrames:
         return committed_frames(within_area(commit, self.pipeline.rig), self._records, self.watch)
 
-    def _submit(
-        self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise
-    ) -> Future[FusedEvidence]:
+    def _submit(self, fuse: Callable[[], FusedEvidence]) -> Future[FusedEvidence]:
         if self._fusion is None:
             done = Future[FusedEvidence]()
-            done.set_result(self._fuse(frame, evidence, explanation, noise))
+            done.set_result(fuse())
             return done
         if len(self._open) == _BEHIND:
             self._open.popleft().result()
-        self._open.append(self._fusion.submit(self._fuse, frame, evidence, explanation, noise))
+        self._open.append(self._fusion.submit(fuse))
         return self._open[-1]
 
     def _timed(self, solution: Callable[[], Commit]) -> Commit:

@@ -92,25 +92,13 @@ def track(
     """
     resolved, force = config_of(config), Workforce(workers)
     chosen, reporter = None if frames is None else FrameRange(*frames), reporter_of(progress)
-    recording, earlier = recording_of(rig, sources), None if known is None else Path(known)
+    given = resolved, tracker, volume, chosen, force, reporter, None if known is None else Path(known)
+    recording = recording_of(rig, sources)
     if output is not None:
-        return track_recording(
-            recording,
-            Path(output),
-            resolved,
-            tracker,
-            volume,
-            chosen,
-            force,
-            reporter,
-            known=earlier,
-            overwrite=overwrite,
-        )
+        return track_recording(recording, Path(output), *given, overwrite=overwrite)
     folder = Path(mkdtemp(prefix="stseg-"))
     try:
-        run = track_recording(
-            recording, folder / "run.h5", resolved, tracker, volume, chosen, force, reporter, known=earlier
-        )
+        run = track_recording(recording, folder / "run.h5", *given)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -127,8 +115,8 @@ def track_recording(
     frames: FrameRange | None,
     workforce: Workforce,
     reporter: Reporter,
-    *,
     known: Path | None = None,
+    *,
     overwrite: bool = False,
 ) -> Run:
     """Track a recording; segments that an unfinished run of the same output left are used.

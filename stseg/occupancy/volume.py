@@ -32,10 +32,10 @@ _UNOCCLUDED = 0.99
 
 
 class _PreparedView(NamedTuple):
-    """Evidence of a view in a frame: its people, their blocks, the sums of its map or the fit of its boxes."""
+    """A view in a frame: its people, blocks that show them or foreground, sums of its map or the fit of its boxes."""
 
     assignment: PixelAssignment
-    people: Flags
+    marked: Flags
     table: SumTable | None
     fit: Singles | None
 
@@ -125,30 +125,23 @@ class Occupancy:
             None if view is None else self._prepared(i, view, explanation, near_person, noise)
             for i, view in enumerate(evidence)
         ]
-        marked = [self._marked(i, view) for i, view in enumerate(views)]
+        marked = [view.marked for view in views if view is not None]
         marked_blocks = np.logical_or.reduce([self._near_people(views, near_person), *marked])
         cells = self._tables.cells_at(marked_blocks, near_person)
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(evidence)]))
-        terms = self._terms(views, marked, cells, explanation, rates, weights.astype(np.float32))
+        terms = self._terms(views, cells, explanation, rates, weights.astype(np.float32))
         return _Fused(cells, near_person, terms, Sums.of(terms))
 
     def _prepared(
         self, i: int, view: Boxes | Singles, explanation: Explanation, near_person: Ints, noise: BoxNoise
     ) -> _PreparedView:
-        assignment, people = self._assignment(i, explanation), self._tables.nothing_marked()
-        mark_people(self._tables.reach[i], assignment, people)
+        assignment, marked = self._assignment(i, explanation), self._tables.nothing_marked()
+        mark_people(self._tables.reach[i], assignment, marked)
         if isinstance(view, Boxes):
-            return _PreparedView(assignment, people, None, self._fit(i, view, explanation, near_person, noise))
-        return _PreparedView(assignment, people, self._sums[i].filled(view), None)
-
-    def _marked(self, i: int, view: _PreparedView | None) -> Flags:
-        """The blocks at which a view shows a person or foreground."""
-        if view is None:
-            return self._tables.nothing_marked()
-        marked = view.people.copy()
-        if view.table is not None:
-            mark_map(self._tables.reach[i], view.table, marked)
-        return marked
+            return _PreparedView(assignment, marked, None, self._fit(i, view, explanation, near_person, noise))
+        table = self._sums[i].filled(view)
+        mark_map(self._tables.reach[i], table, marked)
+        return _PreparedView(assignment, marked, table, None)
 
     def _near_people(self, views: Sequence[_PreparedView | None], near_person: Ints) -> Flags:
         """The blocks above the ground near people, and above the cells that a box might show."""
@@ -161,7 +154,6 @@ class Occupancy:
     def _terms(
         self,
         views: Sequence[_PreparedView | None],
-        marked: Sequence[Flags],
         cells: ShownCells,
         explanation: Explanation,
         rates: Sequence[ErrorRates],
@@ -179,27 +171,20 @@ class Occupancy:
                 np.bitwise_or(cells.unseen[i], np.int16(empty), out=levels[i])  # all bits of UNSEEN are set
                 missing = np.where(view.assignment.separate[:-1], 1.0, explanation.people.visibility[i])
                 confidence[i] = missing.astype(np.float32)
-            self._fill_view(i, view, marked[i], cells, rates[i], levels[i], share[i])
+            self._fill_view(i, view, cells, rates[i], levels[i], share[i])
         terms = np.stack([log_odds_terms(one) for one in rates])
         return FrameTerms(levels, share, cells.near_person, terms, weights, confidence)
 
     def _fill_view(
-        self,
-        i: int,
-        view: _PreparedView,
-        marked: Flags,
-        cells: ShownCells,
-        rates: ErrorRates,
-        levels: Levels,
-        share: Singles,
+        self, i: int, view: _PreparedView, cells: ShownCells, rates: ErrorRates, levels: Levels, share: Singles
     ) -> None:
         """Fill levels and share (n + k,) of a view; those of boxes at representatives are filled before."""
         footprint, distance = self._tables.footprint[i], self._distance[i]
         if view.table is not None:
-            fill_map(i, cells, marked, footprint, view.table, view.assignment, distance, levels, share)
+            fill_map(i, cells, view.marked, footprint, view.table, view.assignment, distance, levels, share)
         elif view.fit is not None:
             share[:] = 1.0
-            fill_share(cells, marked, footprint, view.assignment, distance, share)
+            fill_share(cells, view.marked, footprint, view.assignment, distance, share)
             fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels)
 
     def _levels_and_shares(self, shape: tuple[int, ...]) -> tuple[Levels, Singles]:

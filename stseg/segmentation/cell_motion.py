@@ -14,28 +14,22 @@ def same_tracks(one: Ints, other: Ints) -> tuple[Ints, Ints]:
     return first[order], second[order]
 
 
-def motion_field(
-    ground_now: Floats,
-    ground_next: Floats,
-    track_now: Ints,
-    track_next: Ints,
-    reach: float,
-    cell: float,
-    ground: Floats,
-) -> Ints:
+PlacedTracks = tuple[Floats, Ints]
+"""Places of the detections of a frame, float64 (n, 2), metres, and their tracks, int64 (n,)."""
+
+
+def motion_field(now: PlacedTracks, then: PlacedTracks, reach: float, cell: float, ground: Floats) -> Ints:
     """Motion of each cell until the next frame, (dy, dx) in cells, int64 (y, x, 2).
 
-    It is zero out of reach of tracks detected in both frames. `ground_now` and `ground_next`, float64 (n, 2) and (m,
-    2), are detections of the two frames, metres, `track_now` and `track_next`, int64 (n,) and (m,), their tracks.
-    `reach` is that of a body's cells around its place, `cell` the side of a cell, and `ground` float64 (y, x, 2) the
-    centres of the cells, all in metres.
+    It is zero out of reach of tracks detected in both frames, `now` and `then`. `reach` is that of a body's cells
+    around its place, `cell` the side of a cell, and `ground` float64 (y, x, 2) the centres of the cells, all in metres.
     """
     motion = np.zeros(ground.shape, np.int64)
-    now, later = same_tracks(track_now, track_next)
-    if not len(now):
+    first, second = same_tracks(now[1], then[1])
+    if not len(first):
         return motion
-    start = ground_now[now]
-    moved = np.rint((ground_next[later] - start) / cell).astype(np.int64)
+    start = now[0][first]
+    moved = np.rint((then[0][second] - start) / cell).astype(np.int64)
     nearest = nearest_person(ground, start, reach)
     motion[nearest >= 0] = moved[nearest[nearest >= 0]][:, ::-1]
     return motion

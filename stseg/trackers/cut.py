@@ -158,18 +158,8 @@ class CutTracker:
 
     def _energy(self, frames: list[TrackedFrame], patches: GroundPatches, log_odds: Singles) -> GridEnergy:
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
-        motion = [
-            motion_field(
-                now.fused.people.ground,
-                then.fused.people.ground,
-                now.tracks,
-                then.tracks,
-                reach,
-                grid.cell,
-                patches.ground,
-            )
-            for now, then in pairwise(frames)
-        ]
+        placed = [(one.fused.people.ground, one.tracks) for one in frames]
+        motion = [motion_field(*pair, reach, grid.cell, patches.ground) for pair in pairwise(placed)]
         steps = np.array(motion, np.int64).reshape(-1, *patches.place.shape, 2)
         successor, present = patches.successors(steps), patches.place >= 0
         return build_energy(log_odds, successor, grid, self.config.segmentation, present)

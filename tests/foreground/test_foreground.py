@@ -166,9 +166,9 @@ def test_modes_learn_by_their_rules(seed: int, modes: int, config: reference.Gau
     if isinstance(config, ChromaticConfig):
         least, tolerance = config.chromatic_sd, 1e-3
     numbers = config.background_weight, config.match_distance, config.initial_sd, least, config.minimum_sd
-    constants = Adaptation(*(np.float32(number) for number in numbers))
+    adaptation = Adaptation(*(np.float32(number) for number in (0.05, 0.001, *numbers)))
     found = reference.planes_of(*state)
-    adapt_mixture(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
+    adapt_mixture(image, gain, likelihood, adaptation, 0, 1, found)
     for one, other in zip(reference.modes_of(found), expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=tolerance, atol=tolerance)
 
@@ -176,11 +176,9 @@ def test_modes_learn_by_their_rules(seed: int, modes: int, config: reference.Gau
 def test_rows_between_the_turns_stay_as_they_are() -> None:
     rng = np.random.default_rng(4)
     state = reference.planes_of(*random_modes(rng, 2, MixtureConfig()))
-    found, constants = state.copy(), Adaptation(*(np.float32(number) for number in (0.1, 5, 12, 4, 4)))
+    found, adaptation = state.copy(), Adaptation(*(np.float32(number) for number in (0.05, 0.001, 0.1, 5, 12, 4, 4)))
     image, likelihood = rng.integers(0, 256, (3, 4, 3)).astype(np.uint8), np.zeros((3, 4), np.float32)
-    adapt_mixture(
-        image, np.ones(3, np.float32), likelihood, np.float32(0.05), np.float32(0.001), constants, 1, 4, found
-    )
+    adapt_mixture(image, np.ones(3, np.float32), likelihood, adaptation, 1, 4, found)
     np.testing.assert_array_equal(found[:, :, [0, 2]], state[:, :, [0, 2]])
 
 

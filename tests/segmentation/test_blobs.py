@@ -36,7 +36,7 @@ GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 def test_cells_near_a_person_move_with_them() -> None:
     now = np.array([[0.55, 0.55], [1.45, 0.95]])
     then = np.array([[1.25, 0.85], [0.85, 0.45]])
-    motion = motion_field(now, then, np.array([4, 7]), np.array([7, 4]), 0.25, GRID.cell, GRID.ground)
+    motion = motion_field((now, np.array([4, 7])), (then, np.array([7, 4])), 0.25, GRID.cell, GRID.ground)
     assert motion[5, 5].tolist() == [-1, 3] and motion[9, 14].tolist() == [-1, -2]
     assert motion[6, 6].tolist() == [-1, 3] and not motion[0, 0].any()
     away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - now, -1, 0)).min(2)
@@ -45,9 +45,9 @@ def test_cells_near_a_person_move_with_them() -> None:
 
 def test_a_track_not_detected_again_does_not_move() -> None:
     for now, then in (([3], []), ([3], [9]), ([], [3])):
-        here, there = np.full((len(now), 2), 0.55), np.full((len(then), 2), 1.0)
-        tracks = np.array(now, np.int64), np.array(then, np.int64)
-        motion = motion_field(here, there, *tracks, 0.3, GRID.cell, GRID.ground)
+        here = np.full((len(now), 2), 0.55), np.array(now, np.int64)
+        there = np.full((len(then), 2), 1.0), np.array(then, np.int64)
+        motion = motion_field(here, there, 0.3, GRID.cell, GRID.ground)
         assert motion.shape == (15, 20, 2) and not motion.any()
 
 

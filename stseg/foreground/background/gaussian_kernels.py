@@ -34,8 +34,10 @@ _THIRD, _NEVER = np.float32(1 / 3), np.float32(np.inf)
 
 
 class Adaptation(NamedTuple):
-    """Constants of learning; standard deviations in grey levels."""
+    """Learning rates of background and of what moved in, and constants; standard deviations in grey levels."""
 
+    fast: np.float32
+    slow: np.float32
     background_weight: np.float32
     match_distance: np.float32
     initial_sd: np.float32
@@ -158,15 +160,7 @@ def _densities(
 
 @wide_kernel
 def adapt_mixture(
-    image: Bytes,
-    gain: Singles,
-    likelihood: Singles,
-    fast: np.float32,
-    slow: np.float32,
-    constants: Adaptation,
-    first: int,
-    step: int,
-    modes: Singles,
+    image: Bytes, gain: Singles, likelihood: Singles, adaptation: Adaptation, first: int, step: int, modes: Singles
 ) -> None:
     """Adapt the modes of every `step`-th row from `first` on to a frame, in place; rules of `mixture`.
 
@@ -176,8 +170,6 @@ def adapt_mixture(
     gain : float32 (3,)
     likelihood : float32 (v, u)
         Probability that each pixel shows a person.
-    fast, slow
-        Learning rates of background, and of what moved in.
     modes : float32 (mode, plane, v, u)
     """
     columns, count, planes = image.shape[1], modes.shape[0], modes.shape[1]
@@ -189,15 +181,15 @@ def adapt_mixture(
         for k in range(used):
             _fill_along(colour, gain, modes[k], v, offset[k, 1])
             _fill_across(colour, gain, modes[k], v, offset[k, 1], offset[k, 0])
-        _match(offset, modes[:used], v, constants.match_distance, nearest)
+        _match(offset, modes[:used], v, adaptation.match_distance, nearest)
         rate[:] = _ZERO
         for k in range(used):
-            _fill_rate(nearest, np.int32(k), modes[k, planes - 1, v], likelihood[v], fast, slow, constants, rate)
+            _fill_rate(nearest, np.int32(k), modes[k, planes - 1, v], likelihood[v], adaptation, rate)
         for k in range(used):
-            _adapt(colour, gain, nearest, np.int32(k), offset[k], rate, constants, modes[k], v)
+            _adapt(colour, gain, nearest, np.int32(k), offset[k], rate, adaptation, modes[k], v)
         for u in range(columns):
             if nearest[u] < 0 and likelihood[v, u] >= _HALF:
-                _begin(v, u, colour, gain, slow, constants, modes)
+                _begin(v, u, colour, gain, adaptation, modes)
 
 
 # Loops that write one array and read at most eight become vector code: beyond that the compiler does not prove that the
@@ -265,19 +257,13 @@ def _match(offset: Singles, modes: Singles, v: int, match_distance: np.float32, 
 
 @wide_kernel
 def _fill_rate(
-    nearest: Labels,
-    index: np.int32,
-    weight: Singles,
-    likelihood: Singles,
-    fast: np.float32,
-    slow: np.float32,
-    constants: Adaptation,
-    rate: Singles,
+    nearest: Labels, index: np.int32, weight: Singles, likelihood: Singles, adaptation: Adaptation, rate: Singles
 ) -> None:
     """Set rate (u,) where the nearest mode is `index`, of weight (u,)."""
+    fast, slow = adaptation.fast, adaptation.slow
     for u in range(len(rate)):
         pace = slow * likelihood[u] + fast * (_ONE - likelihood[u])
-        pace = pace if weight[u] >= constants.background_weight else slow
+        pace = pace if weight[u] >= adaptation.background_weight else slow
         rate[u] = pace if nearest[u] == index else rate[u]
 
 
@@ -289,7 +275,7 @@ def _adapt(
     index: np.int32,
     offset: Singles,
     rate: Singles,
-    constants: Adaptation,
+    adaptation: Adaptation,
     mode: Singles,
     v: int,
 ) -> None:
@@ -309,10 +295,10 @@ def _adapt(
             value = value if value < _WHITE else _WHITE
             mean[u] += pace[u] * (colours[u] - value) / gain[c]
     if planes == VARIANCE + 2:
-        _spread(offset[0], offset[1], _THIRD, _THIRD, pace, constants.least_across_sd, mode[VARIANCE, v])
+        _spread(offset[0], offset[1], _THIRD, _THIRD, pace, adaptation.least_across_sd, mode[VARIANCE, v])
     else:
-        _spread(offset[0], offset[1], _HALF, _ZERO, pace, constants.least_across_sd, mode[VARIANCE, v])
-        _spread(offset[0], offset[1], _ZERO, _ONE, pace, constants.least_along_sd, mode[VARIANCE + 1, v])
+        _spread(offset[0], offset[1], _HALF, _ZERO, pace, adaptation.least_across_sd, mode[VARIANCE, v])
+        _spread(offset[0], offset[1], _ZERO, _ONE, pace, adaptation.least_along_sd, mode[VARIANCE + 1, v])
 
 
 @wide_kernel
@@ -334,24 +320,22 @@ def _spread(
 
 
 @wide_kernel
-def _begin(
-    v: int, u: int, colour: Singles, gain: Singles, slow: np.float32, constants: Adaptation, modes: Singles
-) -> None:
+def _begin(v: int, u: int, colour: Singles, gain: Singles, adaptation: Adaptation, modes: Singles) -> None:
     """Put a new mode of pixel (v, u)'s colour in the place of the weakest, unless all are background."""
     planes = modes.shape[1]
     weakest = 0
     for k in range(modes.shape[0]):
         if modes[k, planes - 1, v, u] < modes[weakest, planes - 1, v, u]:
             weakest = k
-    if modes[weakest, planes - 1, v, u] >= constants.background_weight:
+    if modes[weakest, planes - 1, v, u] >= adaptation.background_weight:
         return
     for k in range(modes.shape[0]):
-        modes[k, planes - 1, v, u] *= _ONE - slow
+        modes[k, planes - 1, v, u] *= _ONE - adaptation.slow
     for c in range(3):
         modes[weakest, c, v, u] = colour[c, u] / gain[c]
     for c in range(VARIANCE, planes - 1):
-        modes[weakest, c, v, u] = constants.initial_sd * constants.initial_sd
-    modes[weakest, planes - 1, v, u] = slow
+        modes[weakest, c, v, u] = adaptation.initial_sd * adaptation.initial_sd
+    modes[weakest, planes - 1, v, u] = adaptation.slow
 
 
 @wide_kernel

@@ -66,7 +66,7 @@ class Mixture(Background):
         super().__init__(size, frame_rate, config)
         least = config.chromatic_sd if isinstance(config, ChromaticConfig) else config.minimum_sd, config.minimum_sd
         numbers = config.background_weight, config.match_distance, config.initial_sd, *least
-        self._constants = Adaptation(*(np.float32(number) for number in numbers))
+        self._constants = tuple(np.float32(number) for number in numbers)
         self.modes = np.zeros((config.modes, VARIANCE + self.variances + 1, size[1], size[0]), np.float32)
         self.modes[:, VARIANCE:-1] = config.initial_sd**2
 
@@ -110,9 +110,8 @@ class Mixture(Background):
     def _update(
         self, image: Bytes, gain: Floats, likelihood: Singles, rates: tuple[float, float], first: int, step: int
     ) -> None:
-        fast, slow = (np.float32(rate) for rate in rates)
-        scaled = gain.astype(np.float32)
-        adapt_mixture(image, scaled, likelihood, fast, slow, self._constants, first, step, self.modes)
+        adaptation = Adaptation(*map(np.float32, rates), *self._constants)
+        adapt_mixture(image, gain.astype(np.float32), likelihood, adaptation, first, step, self.modes)
 
 
 class Chromatic(Mixture):
