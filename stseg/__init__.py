@@ -24,67 +24,39 @@ from typing import TYPE_CHECKING, Any
 from stseg.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from stseg.arrays import Boxes
-    from stseg.config import Config
-    from stseg.engine.committed_frames import CommittedFrames
-    from stseg.engine.track import track
-    from stseg.engine.tracker import Tracker
-    from stseg.errors import InputError, StsegError
-    from stseg.evaluation import Scores, evaluate
-    from stseg.geometry import Camera, Grid, Lens, Rig
-    from stseg.io.config_file import read_config
-    from stseg.io.recording.frames import FrameSet
-    from stseg.io.recording.recording import Recording, Source
-    from stseg.io.recording.rigs import read_recording, write_rig
-    from stseg.io.runfile.runs import Run, read_run
-    from stseg.io.track_csv import read_tracks_csv
-    from stseg.tasks.calibration.alignment import align_rig
-    from stseg.tasks.calibration.automatic import calibrate_auto
-    from stseg.tasks.calibration.check import check_rig
-    from stseg.tasks.calibration.points import calibrate_points
-    from stseg.tasks.correction import correct
-    from stseg.tasks.detection import detect
-    from stseg.tasks.forecast import plan
-    from stseg.tasks.measures import measure
-    from stseg.tasks.pixel_labels import label_images
-    from stseg.tasks.report import report
-    from stseg.tasks.simulation import simulate
-
-__all__ = [
-    "Boxes",
-    "Camera",
-    "CommittedFrames",
-    "Config",
-    "FrameSet",
-    "Grid",
-    "InputError",
-    "Lens",
-    "Recording",
-    "Rig",
-    "Run",
-    "Scores",
-    "Source",
-    "StsegError",
-    "Tracker",
-    "align_rig",
-    "calibrate_auto",
-    "calibrate_points",
-    "check_rig",
-    "correct",
-    "detect",
-    "evaluate",
-    "label_images",
-    "measure",
-    "plan",
-    "read_config",
-    "read_recording",
-    "read_run",
-    "read_tracks_csv",
-    "report",
-    "simulate",
-    "track",
-    "write_rig",
-]
+    from stseg.arrays import Boxes as Boxes
+    from stseg.config import Config as Config
+    from stseg.engine.committed_frames import CommittedFrames as CommittedFrames
+    from stseg.engine.track import track as track
+    from stseg.engine.tracker import Tracker as Tracker
+    from stseg.errors import InputError as InputError
+    from stseg.errors import StsegError as StsegError
+    from stseg.evaluation import Scores as Scores
+    from stseg.evaluation import evaluate as evaluate
+    from stseg.geometry import Camera as Camera
+    from stseg.geometry import Grid as Grid
+    from stseg.geometry import Lens as Lens
+    from stseg.geometry import Rig as Rig
+    from stseg.io.config_file import read_config as read_config
+    from stseg.io.recording.frames import FrameSet as FrameSet
+    from stseg.io.recording.recording import Recording as Recording
+    from stseg.io.recording.recording import Source as Source
+    from stseg.io.recording.rigs import read_recording as read_recording
+    from stseg.io.recording.rigs import write_rig as write_rig
+    from stseg.io.runfile.runs import Run as Run
+    from stseg.io.runfile.runs import read_run as read_run
+    from stseg.io.track_csv import read_tracks_csv as read_tracks_csv
+    from stseg.tasks.calibration.alignment import align_rig as align_rig
+    from stseg.tasks.calibration.automatic import calibrate_auto as calibrate_auto
+    from stseg.tasks.calibration.check import check_rig as check_rig
+    from stseg.tasks.calibration.points import calibrate_points as calibrate_points
+    from stseg.tasks.correction import correct as correct
+    from stseg.tasks.detection import detect as detect
+    from stseg.tasks.forecast import plan as plan
+    from stseg.tasks.measures import measure as measure
+    from stseg.tasks.pixel_labels import label_images as label_images
+    from stseg.tasks.report import report as report
+    from stseg.tasks.simulation import simulate as simulate
 
 _HOMES = {
     "stseg.arrays": ("Boxes",),
@@ -114,6 +86,7 @@ _HOMES = {
     "stseg.tasks.simulation": ("simulate",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+__all__ = sorted(_HOME_OF)
 
 
 def __getattr__(name: str) -> Any:
