@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Rows, columns
 from stseg.records.track_heights import median_measured
 
 TRAJECTORY = np.dtype(
@@ -45,47 +45,23 @@ TRACK = np.dtype(
 )
 """One row per track."""
 
-BOX = np.dtype(
-    [
-        ("frame", "<i8"),
-        ("id", "<i8"),
-        ("view", "<i4"),
-        ("left", "<f4"),  # pixels
-        ("top", "<f4"),
-        ("width", "<f4"),
-        ("height", "<f4"),
-    ]
-)
-"""A track's box in one view: around its localisation over all planes."""
+BOX = columns("frame:<i8 id:<i8 view:<i4 left:<f4 top:<f4 width:<f4 height:<f4")
+"""A track's box in one view, pixels: around its localisation over all planes."""
 
-EVENT = np.dtype([("frame", "<i8"), ("kind", "S12"), ("id", "<i8"), ("other", "<i8"), ("reason", "S96")])
+EVENT = columns("frame:<i8 kind:S12 id:<i8 other:<i8 reason:S96")
 """birth, death, merge, split, hand-over, doubt, return, dropped, blind, crowd; `other` is another track, 0 for none."""
 
-CORRECTION = np.dtype(
-    [
-        ("decision_frame", "<i8"),  # latest frame by which it was decided
-        ("first", "<i8"),  # frames, both included
-        ("last", "<i8"),
-        ("id", "<i8"),
-        ("corrected_id", "<i8"),
-    ]
-)
-"""Rows of a live id in some frames that are of another id."""
+CORRECTION = columns("decision_frame:<i8 first:<i8 last:<i8 id:<i8 corrected_id:<i8")
+"""Rows of a live id in frames `first` to `last`, both included, that are of another id.
 
-CANDIDATE = np.dtype(
-    [
-        ("frame", "<i8"),
-        ("x", "<f8"),
-        ("y", "<f8"),
-        ("xx", "<f8"),
-        ("xy", "<f8"),
-        ("yy", "<f8"),
-        ("height", "<f4"),
-        ("status", "u1"),  # 1 true, 0 ghost
-        ("evidence", "<f4"),  # log-odds by all views and the prior, nats; below 0 for a ghost
-    ]
-)
-"""One row per candidate and frame, true or ghost. In the run file each row also has one column a view."""
+`decision_frame` is the latest frame by which it was decided.
+"""
+
+CANDIDATE = columns("frame:<i8 x:<f8 y:<f8 xx:<f8 xy:<f8 yy:<f8 height:<f4 status:u1 evidence:<f4")
+"""One row per candidate and frame, true (status 1) or ghost (0). In the run file each row also has one column a view.
+
+`evidence` is the log-odds by all views and the prior, nats; below 0 for a ghost.
+"""
 
 FEATURES, COLOURS = 16, 6
 """Numbers of APPEARANCE."""
@@ -116,7 +92,7 @@ WINDOW = np.dtype(
 )
 """One row per window."""
 
-TIMING = np.dtype([("stage", "S24"), ("window", "<i8"), ("seconds", "<f8")])
+TIMING = columns("stage:S24 window:<i8 seconds:<f8")
 """One row per stage and window; window -1 for work that belongs to none."""
 
 
@@ -130,21 +106,18 @@ RATES = np.dtype(
         ("miss", "<f4"),  # how often a cell of a body is missed
         ("clutter", "<f4"),  # how often the ray of an empty cell meets foreground, away from people
         ("person_clutter", "<f4"),  # the same within reach of a person
-        (
-            "occupied_share",
-            "<f4",
-        ),  # share of the cells within reach of a person that bodies fill, by all views
+        ("occupied_share", "<f4"),  # share of the cells within reach of a person that bodies fill, by all views
         ("residual", "<f4"),  # mean reprojection residual, metres to the right of the positions by all views; or nan
     ]
 )
 """One row per window and view: error rates of its last frame, 0..1, and the residual of all its frames."""
 
 
-SHIFT = np.dtype([("frame", "<i8"), ("view", "<i4"), ("u", "<f4"), ("v", "<f4")])
+SHIFT = columns("frame:<i8 view:<i4 u:<f4 v:<f4")
 """Shift of a colour view's picture since its background was learned, pixels, every other second."""
 
 
-ANSWER = np.dtype([("row", "<i8"), ("other", "<i8"), ("people", "u1")])
+ANSWER = columns("row:<i8 other:<i8 people:u1")
 """Number of people that two committed rows show by an answer, by their index: 1, 2, or 0 for a row that is no person.
 
 A row that is no person is its own `other`.
