@@ -1,6 +1,7 @@
 """Outlines of pillars on a raster: one span of columns a row, from the discs of `stseg.bodies.pillars`."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,17 @@ WHOLE_SHARE = 0.9
 """Share of an outline's area that lies in the image where the image's border does not cut the body."""
 Spans = NDArray[np.int16]
 """int16 (..., row, 2): first and last column (exclusive) of an outline in each raster row."""
+
+
+class Pillars(NamedTuple):
+    """Pillars in arrays of one shape (...)."""
+
+    ground: Floats
+    """float64 (..., 2): places, metres."""
+    height: Floats
+    """Metres."""
+    width: Floats
+    """Relative to the silhouette of `stseg.bodies.pillars`."""
 
 
 def outlines(
@@ -51,7 +63,7 @@ def outlines(
     wide = np.ones(len(ground)) if widths is None else widths
     spans = np.zeros((len(ground), shape[0], 2), np.int16)
     place = np.ascontiguousarray(ground, float)
-    _fill_outlines(table, place, heights, wide, float(step), shape[1], first, count, spans, area)
+    _fill_outlines(table, Pillars(place, heights, wide), float(step), shape[1], first, count, spans, area)
     return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area
 
 
@@ -64,15 +76,9 @@ def paint_outlines(order: Ints, first: Ints, spans: Spans, assigned: Shorts) -> 
                 assigned[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
 
 
+@kernel
 def sums_inside(
-    table: BodyTable,
-    ground: Floats,
-    heights: Floats,
-    widths: Floats,
-    step: int,
-    values: Singles,
-    owner: Shorts,
-    number: Ints,
+    table: BodyTable, pillars: Pillars, step: int, values: Singles, owner: Shorts, number: Ints
 ) -> tuple[Floats, Floats]:
     """Sums of a map inside outlines of pillars, several for each person: quicker than outlines that are kept.
 
@@ -80,10 +86,8 @@ def sums_inside(
     ----------
     table, step
         As for `outlines`.
-    ground : float64 (person, pillar, 2)
-        Their places, metres.
-    heights, widths : float64 (person, pillar)
-        Metres, and beside the silhouette of `stseg.bodies.pillars`.
+    pillars
+        Arrays of (person, pillar).
     values : float32 (v, u)
         On the raster.
     owner : int16 (v, u)
@@ -96,17 +100,30 @@ def sums_inside(
     sums, area : float64 (person, pillar)
         Of what counts, and pixels of the whole outline; both 0 where the view does not see the pillar.
     """
-    sums, area = np.zeros(heights.shape), np.zeros(heights.shape)
-    _fill_sums(table, ground, heights, widths, float(step), values, owner, number, sums, area)
+    sums, area = np.zeros(pillars.height.shape), np.zeros(pillars.height.shape)
+    rows, columns = values.shape
+    discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((sums.shape[1], len(SILHOUETTE), 6))
+    low, high, left_of = np.empty(rows), np.empty(rows), np.empty(rows * (columns + 1))
+    for j in range(sums.shape[0]):
+        for i in range(sums.shape[1]):
+            ground = pillars.ground[j, i]
+            x, y = (ground[0] - table.origin[0]) / table.step, (ground[1] - table.origin[1]) / table.step
+            fill_discs(table, x, y, pillars.height[j, i], SILHOUETTE, discs)
+            if _seen(discs):
+                area[j, i] = _fill_drawn(discs, float(step), pillars.width[j, i], drawn[i])
+        window = _window(drawn, area[j], rows, columns)
+        _fill_left_of(values, owner, number[j], window, left_of)
+        for i in range(sums.shape[1]):
+            if area[j, i] > 0:
+                top, bottom = _draw(drawn[i], low, high)
+                sums[j, i] = _between(left_of, window, low, high, top, bottom, columns)
     return sums, area
 
 
 @kernel
 def _fill_outlines(
     table: BodyTable,
-    ground: Floats,
-    heights: Floats,
-    widths: Floats,
+    pillars: Pillars,
     raster_step: float,
     columns: int,
     first: Ints,
@@ -116,44 +133,14 @@ def _fill_outlines(
 ) -> None:
     rows, (discs, drawn) = spans.shape[1], np.empty((2, len(SILHOUETTE), 6))
     low, high = np.empty(rows), np.empty(rows)
-    for i in range(len(ground)):
-        x, y = (ground[i, 0] - table.origin[0]) / table.step, (ground[i, 1] - table.origin[1]) / table.step
-        fill_discs(table, x, y, heights[i], SILHOUETTE, discs)
+    for i in range(len(first)):
+        ground = pillars.ground[i]
+        x, y = (ground[0] - table.origin[0]) / table.step, (ground[1] - table.origin[1]) / table.step
+        fill_discs(table, x, y, pillars.height[i], SILHOUETTE, discs)
         if _seen(discs):
-            area[i] = _fill_drawn(discs, raster_step, widths[i], drawn)
+            area[i] = _fill_drawn(discs, raster_step, pillars.width[i], drawn)
             top, bottom = _draw(drawn, low, high)
             _store(low, high, top, bottom, columns, i, first, count, spans)
-
-
-@kernel
-def _fill_sums(
-    table: BodyTable,
-    ground: Floats,
-    heights: Floats,
-    widths: Floats,
-    raster_step: float,
-    values: Singles,
-    owner: Shorts,
-    number: Ints,
-    sums: Floats,
-    area: Floats,
-) -> None:
-    people, pillars = heights.shape
-    rows, columns = values.shape
-    discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((pillars, len(SILHOUETTE), 6))
-    low, high, left_of = np.empty(rows), np.empty(rows), np.empty(rows * (columns + 1))
-    for j in range(people):
-        for i in range(pillars):
-            x, y = (ground[j, i, 0] - table.origin[0]) / table.step, (ground[j, i, 1] - table.origin[1]) / table.step
-            fill_discs(table, x, y, heights[j, i], SILHOUETTE, discs)
-            if _seen(discs):
-                area[j, i] = _fill_drawn(discs, raster_step, widths[j, i], drawn[i])
-        window = _window(drawn, area[j], rows, columns)
-        _fill_left_of(values, owner, number[j], window, left_of)
-        for i in range(pillars):
-            if area[j, i] > 0:
-                top, bottom = _draw(drawn[i], low, high)
-                sums[j, i] = _between(left_of, window, low, high, top, bottom, columns)
 
 
 @part

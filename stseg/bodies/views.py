@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Shorts, Singles
 from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, fill_inside
-from stseg.bodies.outlines import Spans, outlines, sums_inside
+from stseg.bodies.outlines import Pillars, Spans, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import WIDTH, BodyTable
 from stseg.config import BodyConfig, DetectionConfig
@@ -199,8 +199,8 @@ class PixelView(View):
 
         Both float64 (person, pillar); see `stseg.bodies.outlines.sums_inside`.
         """
-        wide = pillars.width / WIDTH
-        sums, area = sums_inside(self.table, pillars.ground, pillars.height, wide, self.step, values, owner, number)
+        drawn = Pillars(pillars.ground, pillars.height, pillars.width / WIDTH)
+        sums, area = sums_inside(self.table, drawn, self.step, values, owner, number)
         return sums * self.config.effective_observations, area / pillars.area_ratio
 
 

@@ -15,7 +15,7 @@ from strategies import drawn, numbers
 import stseg
 from stseg.arrays import Flags, Floats, Singles
 from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, fill_inside, fill_match, half_square
-from stseg.bodies.outlines import outlines, sums_inside
+from stseg.bodies.outlines import Pillars, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable
 from stseg.bodies.views import PixelView, ViewObservation
@@ -114,7 +114,7 @@ def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
     widths = chance.uniform(0.8, 1.3, (2, 3))
     shape = (-(-96 // step), -(-128 // step))
     values, owner = chance.normal(size=shape).astype(np.float32), chance.integers(-1, 3, shape, np.int16)
-    sums, whole = sums_inside(table, ground, heights, widths, step, values, owner, np.arange(2))
+    sums, whole = sums_inside(table, Pillars(ground, heights, widths), step, values, owner, np.arange(2))
     for person in range(2):
         first, spans, area = outlines(table, ground[person], heights[person], step, shape, widths[person])
         raster = np.where((owner < 0) | (owner == person), values, 0).astype(float)
