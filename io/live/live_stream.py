@@ -111,13 +111,8 @@ class LiveStream(Thread):
         factor: int = 1,
     ) -> None:
         super().__init__(name=f"camera {camera.name}", daemon=True)
-        self._source, self._camera, self._config, self._report, self._connect = (
-            source,
-            camera,
-            config,
-            report,
-            connect,
-        )
+        self._source, self._camera, self._config = source, camera, config
+        self._report, self._connect = report, connect
         self._period, self._kept, self._factor = period, kept, factor
         self.pictures: deque[TimedPicture] = deque()
         """The newest pictures in order of arrival, guarded by `arrival`; the last one is always kept."""

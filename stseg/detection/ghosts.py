@@ -21,10 +21,8 @@ def rejected_candidates(estimate: MapEstimate) -> People:
     rejected, additions = estimate.others, estimate.other_additions
     pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
     covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))
-    prior, sizes = (
-        candidate_prior_log_odds(estimate, rejected, additions.track_index),
-        Sizes.of_population(len(rejected), body),
-    )
+    prior = candidate_prior_log_odds(estimate, rejected, additions.track_index)
+    sizes = Sizes.of_population(len(rejected), body)
     return People(
         pool.ground,
         pool.height,

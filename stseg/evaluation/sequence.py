@@ -238,10 +238,8 @@ def _distances(person_ground: Floats, track_ground: Floats, reach: float) -> Flo
         distance = person_ground[:, None] - track_ground[None]
         return np.hypot(distance[..., 0], distance[..., 1])
     partners = cKDTree(person_ground).query_ball_tree(cKDTree(track_ground), reach * (1 + 1e-9))
-    rows, columns = (
-        np.repeat(np.arange(len(partners)), [len(one) for one in partners]),
-        np.concatenate(partners).astype(np.int64),
-    )
+    rows = np.repeat(np.arange(len(partners)), [len(one) for one in partners])
+    columns = np.concatenate(partners).astype(np.int64)
     distance = np.full((len(person_ground), len(track_ground)), np.inf)
     distance[rows, columns] = np.hypot(*(person_ground[rows] - track_ground[columns]).T)
     return distance

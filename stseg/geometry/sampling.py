@@ -115,14 +115,10 @@ def _fill_boxes(
                 continue
             x, y, wide, tall = ground[j, i, 0], ground[j, i, 1], 1.0, 1.0
             if shift > 0:
-                east, west = (
-                    pixel_of(projection, lens, x + shift, y, height),
-                    pixel_of(projection, lens, x - shift, y, height),
-                )
-                north, south = (
-                    pixel_of(projection, lens, x, y + shift, height),
-                    pixel_of(projection, lens, x, y - shift, height),
-                )
+                east = pixel_of(projection, lens, x + shift, y, height)
+                west = pixel_of(projection, lens, x - shift, y, height)
+                north = pixel_of(projection, lens, x, y + shift, height)
+                south = pixel_of(projection, lens, x, y - shift, height)
                 wide = _extent(east[0] - west[0], north[0] - south[0])
                 tall = _extent(east[1] - west[1], north[1] - south[1])
             boxes[j, i, 0], boxes[j, i, 2] = _span_about(centre[j, i, 0], wide, size[0])

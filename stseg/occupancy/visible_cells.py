@@ -59,10 +59,8 @@ def _overlap(first: int, extent: int, step: int, k: int) -> int:
 def _shows_a_person(assigned: PixelAssignment, left: int, top: int, width: int, height: int) -> bool:
     # Unsigned places: none is negative, which is not asked here.
     above, below = np.uint64(assigned.row[np.uint64(top)]), np.uint64(assigned.row[np.uint64(top + height - 1)] + 1)
-    first, stop = (
-        np.uint64(assigned.column[np.uint64(left)]),
-        np.uint64(assigned.column[np.uint64(left + width - 1)] + 1),
-    )
+    first = np.uint64(assigned.column[np.uint64(left)])
+    stop = np.uint64(assigned.column[np.uint64(left + width - 1)] + 1)
     table = assigned.occupied
     return bool(table[below, stop] - table[below, first] != table[above, stop] - table[above, first])
 
@@ -95,10 +93,8 @@ def _others_inside(
     """`_hidden_pixels`, and the sum of the likelihood levels of all pixels that show a person other than `person`."""
     hidden, total = 0, 0
     above, below = np.uint64(assigned.row[np.uint64(top)]), np.uint64(assigned.row[np.uint64(top + height - 1)] + 1)
-    first, stop = (
-        np.uint64(assigned.column[np.uint64(left)]),
-        np.uint64(assigned.column[np.uint64(left + width - 1)] + 1),
-    )
+    first = np.uint64(assigned.column[np.uint64(left)])
+    stop = np.uint64(assigned.column[np.uint64(left + width - 1)] + 1)
     for j in range(above, below):
         v, end = max(top, j * assigned.step), min(top + height, (j + 1) * assigned.step)
         for i in range(first, stop):
