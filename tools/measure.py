@@ -15,7 +15,7 @@ import numpy as np
 from result_sets import ResultSet
 from workbench import Bench
 
-from stseg.arrays import Boxes, Observation, Rows, ViewEvidence
+from stseg.arrays import Boxes, Observation, ViewEvidence
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.pipeline import Pipeline
@@ -29,6 +29,7 @@ from stseg.io.detections.source_detections import appearance_axes
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
+from stseg.trajectories.final_tracks import CommittedRows
 
 DROPPED = 1 / 200
 """Share of boxes, and of frames of a view without boxes, that a perturbed run does not see."""
@@ -79,8 +80,7 @@ class Tracked(NamedTuple):
     """A perturbed run before its final tracks, and the perturbed rig's pipeline that finds them."""
 
     pipeline: Pipeline
-    rows: tuple[Rows, Rows, Rows]
-    """Committed TRAJECTORY, EVENT and APPEARANCE rows."""
+    rows: CommittedRows
 
 
 def tracked(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: str = "cut") -> Tracked:
@@ -97,13 +97,13 @@ def tracked(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: st
     with open_frames(recording, first, stop) as frames:
         steps = list(run_session(pipeline, foregrounds, frames, first, frames_done.append))  # type: ignore[arg-type]
     trajectory, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
-    return Tracked(pipeline, (trajectory, events, np.concatenate([step.appearance for step in steps])))
+    return Tracked(pipeline, CommittedRows(trajectory, events, np.concatenate([step.appearance for step in steps])))
 
 
 def scored(one: ResultSet, bench: Bench, run: Tracked) -> Scores:
     """Scores of the final tracks of a perturbed run."""
     assert one.truth is not None
-    rows = run.pipeline.finished(*run.rows)[0].trajectory
+    rows = run.pipeline.finished(run.rows)[0].trajectory
     area = scored_area(one, read_recording(bench.path(one.rig)).rig)
     frames = np.arange(*map(int, one.frames.split(":")))
     flagged = "--ignore-flagged" in shlex.split(one.scoring)

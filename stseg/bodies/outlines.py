@@ -100,12 +100,13 @@ def sums_inside(
     sums, area : float64 (person, pillar)
         Of what counts, and pixels of the whole outline; both 0 where the view does not see the pillar.
     """
-    sums, area = np.zeros(pillars.height.shape), np.zeros(pillars.height.shape)
+    people, pillar_count = pillars.height.shape
     rows, columns = values.shape
-    discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((sums.shape[1], len(SILHOUETTE), 6))
+    sums, area = np.zeros((people, pillar_count)), np.zeros((people, pillar_count))
+    discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((pillar_count, len(SILHOUETTE), 6))
     low, high, left_of = np.empty(rows), np.empty(rows), np.empty(rows * (columns + 1))
-    for j in range(sums.shape[0]):
-        for i in range(sums.shape[1]):
+    for j in range(people):
+        for i in range(pillar_count):
             ground = pillars.ground[j, i]
             x, y = (ground[0] - table.origin[0]) / table.step, (ground[1] - table.origin[1]) / table.step
             fill_discs(table, x, y, pillars.height[j, i], SILHOUETTE, discs)
@@ -113,7 +114,7 @@ def sums_inside(
                 area[j, i] = _fill_drawn(discs, float(step), pillars.width[j, i], drawn[i])
         window = _window(drawn, area[j], rows, columns)
         _fill_left_of(values, owner, number[j], window, left_of)
-        for i in range(sums.shape[1]):
+        for i in range(pillar_count):
             if area[j, i] > 0:
                 top, bottom = _draw(drawn[i], low, high)
                 sums[j, i] = _between(left_of, window, low, high, top, bottom, columns)

@@ -67,6 +67,26 @@ class PillarIndex(NamedTuple):
         return cls(order.astype(np.int32), middle[order], top[order], bottom[order], start, tallest)
 
 
+class ViewBoxes(NamedTuple):
+    """Boxes of one view.
+
+    Attributes
+    ----------
+    edges : float64 (box, 4)
+        left, top, right, bottom, pixels, within the image.
+    tolerance : float64 (box, 5), belief : float64 (box,)
+        See `stseg.bodies.box_fit`.
+    width, height
+        Size of the image, pixels.
+    """
+
+    edges: Floats
+    tolerance: Floats
+    belief: Floats
+    width: float
+    height: float
+
+
 @part
 def _reach(quantity: int, tall: float, tolerance: Floats, deviations: float) -> float:
     """Greatest offset of a box in one quantity from a pillar that it fits within so many tolerances, pixels."""
@@ -94,31 +114,13 @@ def pillar_range(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, 
 
 @kernel
 def fill_fits(
-    index: PillarIndex,
-    bodies: Floats | Singles,
-    box: Floats,
-    tolerance: Floats,
-    belief: float,
-    width: float,
-    height: float,
-    least: float,
-    pillar: Labels,
-    fit: Floats,
+    index: PillarIndex, bodies: Floats | Singles, boxes: ViewBoxes, b: int, least: float, pillar: Labels, fit: Floats
 ) -> int:
-    """Fill pillar (k,) and fit (k,) with the pillars of which a box has a log-likelihood above `least`, and with that.
+    """Fill pillar (k,) and fit (k,) with the pillars of which box b has a log-likelihood above `least`, and with that.
 
-    Parameters
-    ----------
-    bodies : float (pillar, 4), box : float64 (4,)
-        left, top, right, bottom, pixels.
-    tolerance : float64 (5,), belief
-        See `stseg.bodies.box_fit`.
-
-    Returns
-    -------
-    int
-        Number of these.
+    `bodies` float (pillar, 4) are left, top, right, bottom, pixels. Returned is the number of these pillars.
     """
+    box, tolerance, belief = boxes.edges[b], boxes.tolerance[b], boxes.belief[b]
     spare, number = belief - least, 0
     if spare <= 0.0:
         return 0
@@ -136,7 +138,7 @@ def fill_fits(
             if abs(index.top[k] - top) > head or not -late <= index.bottom[k] - bottom <= early:
                 continue
             i = index.order[k]
-            likelihood = belief - half_square(bodies[i], box, tolerance, width, height)
+            likelihood = belief - half_square(bodies[i], box, tolerance, boxes.width, boxes.height)
             if likelihood > least:
                 pillar[number], fit[number] = i, likelihood
                 number += 1

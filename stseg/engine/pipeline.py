@@ -18,7 +18,7 @@ from stseg.config import Config
 from stseg.detection.appearance import appearance_rows
 from stseg.detection.detector import Detector
 from stseg.geometry import Rig
-from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem
+from stseg.identities.association import IdentityProblem
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.occupancy.volume import Occupancy
 from stseg.records.border import Border
@@ -27,7 +27,14 @@ from stseg.records.people import Explanation
 from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
 from stseg.trackers.protocol import TrackingMethod
-from stseg.trajectories.final_tracks import FinalTracks, box_rows, bridged_rows, committed_tracks, final_tracks
+from stseg.trajectories.final_tracks import (
+    CommittedRows,
+    FinalTracks,
+    box_rows,
+    bridged_rows,
+    committed_tracks,
+    final_tracks,
+)
 
 _HUANG_WANG = "stseg.baselines.huang_wang_2012.proposals:Proposals"
 CANDIDATE_SOURCES = {"volume": _HUANG_WANG, "probability": _HUANG_WANG, "both": _HUANG_WANG}
@@ -83,12 +90,9 @@ class Pipeline:
         tables = [view.table for view in self.detector.views]
         return appearance_rows(frame, explanation, tables, self.axes, observations, evidence, images)
 
-    def finished(
-        self, committed: Rows, events: Rows, appearance: Rows, image_rig: Rig | None = None
-    ) -> tuple[Tracks, Ints]:
+    def finished(self, rows: CommittedRows, image_rig: Rig | None = None) -> tuple[Tracks, Ints]:
         """The tracks of a whole run (`finished_tracks`), their boxes in this rig's pixels or those of another."""
-        image_rig = self.rig if image_rig is None else image_rig
-        return finished_tracks(self.rig, self.config, self.tracker, committed, events, appearance, image_rig)
+        return finished_tracks(self.rig, self.config, self.tracker, rows, self.rig if image_rig is None else image_rig)
 
 
 def find_candidate_source(rig: Rig, kinds: Sequence[str], config: Config) -> CandidateSource | None:
@@ -105,14 +109,7 @@ def decides_by_appearance(tracker: type[TrackingMethod], config: Config) -> bool
 
 
 def finished_tracks(
-    rig: Rig,
-    config: Config,
-    tracker: type[TrackingMethod],
-    committed: Rows,
-    events: Rows,
-    appearance: Rows,
-    image_rig: Rig,
-    known: Rows = NO_KNOWN_PEOPLE,
+    rig: Rig, config: Config, tracker: type[TrackingMethod], rows: CommittedRows, image_rig: Rig
 ) -> tuple[Tracks, Ints]:
     """The tracks of a whole run, and the track id of each committed row.
 
@@ -120,35 +117,22 @@ def finished_tracks(
     ----------
     rig, config, tracker
         By which the rows were committed.
-    committed : TRAJECTORY (n,)
-        Rows of all frames, as the tracker committed them.
-    events : EVENT (k,)
-        All events, as the tracker committed them.
-    appearance : APPEARANCE (l,)
-        What the detections look like.
+    rows
+        Rows of all frames.
     image_rig
         The rig in whose pixels the tracks' boxes are given.
-    known : KNOWN_PERSON (m,)
-        People of earlier recordings.
     """
     if not tracker.final:
-        return associated_tracks(rig, config, committed, events, appearance, image_rig, known=known)
-    whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
+        return associated_tracks(rig, config, rows, image_rig)
+    whole = committed_tracks(rows.trajectory, rows.events, rig.frame_rate, config.tracking)
     return _with_boxes(whole, image_rig, config.body.breadth), whole.identity
 
 
 def associated_tracks(
-    rig: Rig,
-    config: Config,
-    committed: Rows,
-    events: Rows,
-    appearance: Rows,
-    image_rig: Rig,
-    constraints: Constraints = NO_CONSTRAINTS,
-    known: Rows = NO_KNOWN_PEOPLE,
+    rig: Rig, config: Config, rows: CommittedRows, image_rig: Rig, constraints: Constraints = NO_CONSTRAINTS
 ) -> tuple[Tracks, Ints]:
     """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
-    whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints, known)
+    whole = final_tracks(rows, rig.frame_rate, Border.of(rig), config, constraints)
     return _with_boxes(whole, image_rig, config.body.breadth), whole.identity
 
 

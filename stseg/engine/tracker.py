@@ -20,6 +20,7 @@ from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.pictures import reduced_view
 from stseg.io.untrusted import limits
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks
+from stseg.trajectories.final_tracks import CommittedRows
 
 
 class Tracker:
@@ -118,7 +119,7 @@ class Tracker:
         rows: Rows = np.concatenate([np.zeros(0, TRAJECTORY), *(result.commit.trajectory for result in results)])
         events: Rows = np.concatenate([np.zeros(0, EVENT), *(result.commit.events for result in results)])
         appearance: Rows = np.concatenate([np.zeros(0, APPEARANCE), *(result.appearance for result in results)])
-        return self._session.pipeline.finished(rows, events, appearance, self.rig)[0]
+        return self._session.pipeline.finished(CommittedRows(rows, events, appearance), self.rig)[0]
 
     def _begin(self, observations: Sequence[Observation], frame: int) -> Session:
         """The stages, for the kinds of the first observations; a blind camera is taken to be of the others' kind."""

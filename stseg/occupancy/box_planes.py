@@ -19,7 +19,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
 from stseg.bodies.box_fit import half_square
-from stseg.bodies.pillar_index import PillarIndex, fill_fits
+from stseg.bodies.pillar_index import PillarIndex, ViewBoxes, fill_fits
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.kernels.accelerate import kernel
@@ -28,29 +28,6 @@ from stseg.occupancy.shown_cells import ShownCells
 
 _LEAST_FIT = 18.0
 """A box that fits a pillar by this much worse than perfectly is none, nats: it would raise L by less than a level."""
-
-
-class ViewBoxes(NamedTuple):
-    """Boxes of one view.
-
-    Attributes
-    ----------
-    edges : float64 (box, 4)
-        left, top, right, bottom, pixels, within the image.
-    tolerance : float64 (box, 5), belief : float64 (box,)
-        See `stseg.bodies.box_fit`.
-    person : int64 (box,)
-        The person that each box is assigned to, -1 for none.
-    width, height
-        Size of the image, pixels.
-    """
-
-    edges: Floats
-    tolerance: Floats
-    belief: Floats
-    person: Ints
-    width: float
-    height: float
 
 
 class CellsByPerson(NamedTuple):
@@ -86,6 +63,7 @@ def fill_fit(
     height_prior: Floats,
     person_prior: Floats,
     boxes: ViewBoxes,
+    owner: Ints,
     cells: CellsByPerson,
     fit: Singles,
 ) -> None:
@@ -98,11 +76,13 @@ def fill_fit(
     height_prior : float64 (height,), person_prior : float64 (person, height)
         Log-prior of the height at cells near no person, and near each person. The second is centred on the person's
         estimated height, so that an unusual height costs nothing again in every view.
+    owner : int64 (box,)
+        The person that each box is assigned to, -1 for none.
     """
     ground_cells, pillar, match = fit.shape[1], np.empty(len(index.order), np.int32), np.empty(len(index.order))
     fit[:] = -np.inf
     for b in range(len(boxes.edges)):
-        box, tolerance, person = boxes.edges[b], boxes.tolerance[b], boxes.person[b]
+        box, tolerance, person = boxes.edges[b], boxes.tolerance[b], owner[b]
         if person >= 0:
             for k in range(cells.start[person], cells.start[person + 1]):
                 for h in range(len(height_prior)):
@@ -111,18 +91,7 @@ def fill_fit(
                     log_fit = np.float32(person_prior[person, h] + own_match)
                     fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
             continue
-        number = fill_fits(
-            index,
-            pillars,
-            box,
-            tolerance,
-            boxes.belief[b],
-            boxes.width,
-            boxes.height,
-            boxes.belief[b] - _LEAST_FIT,
-            pillar,
-            match,
-        )
+        number = fill_fits(index, pillars, boxes, b, boxes.belief[b] - _LEAST_FIT, pillar, match)
         for k in range(number):
             h, cell = pillar[k] // ground_cells, pillar[k] % ground_cells
             prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]

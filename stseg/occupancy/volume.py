@@ -9,14 +9,14 @@ import numpy as np
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
 from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise
 from stseg.bodies.box_likelihood import box_likelihood
-from stseg.bodies.pillar_index import PillarIndex
+from stseg.bodies.pillar_index import PillarIndex, ViewBoxes
 from stseg.bodies.pillars import BodyTable, inside_bodies
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Rig
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable
-from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match
+from stseg.occupancy.box_planes import CellsByPerson, fill_fit, fill_levels, level_of_match
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
@@ -262,17 +262,11 @@ class Occupancy:
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
-        boxes = ViewBoxes(edges, *noise.of(view.score), owner, width, height)
+        boxes = ViewBoxes(edges, *noise.of(view.score), width, height)
+        cells = CellsByPerson.of(near_person, len(people))
+        priors = self._height_prior(np.array([self.height_mean]))[0], self._height_prior(people.height)
         fit = np.empty((len(self.heights), near_person.size), np.float32)
-        fill_fit(
-            pillars[1],
-            pillars[0],
-            self._height_prior(np.array([self.height_mean]))[0],
-            self._height_prior(people.height),
-            boxes,
-            CellsByPerson.of(near_person, len(people)),
-            fit,
-        )
+        fill_fit(pillars[1], pillars[0], *priors, boxes, owner, cells, fit)
         return fit
 
     def _height_prior(self, expected: Floats) -> Floats:

@@ -14,6 +14,7 @@ the prior share of occupied cells.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,16 @@ class BodyShape:
     """pi: prior share of occupied cells, 0..1."""
 
 
+class _TrackDensities(NamedTuple):
+    """Densities of places predicted for tracks, each (time, k, ...): as of `PredictedPlaces`, metres."""
+
+    expected: Flags
+    ground: Floats
+    precision: Floats
+    log_volume: Floats
+    height: Floats
+
+
 def track_shares(
     frame: Ints,
     ground: Floats,
@@ -61,18 +72,8 @@ def track_shares(
     if appearance is not None:
         weight[:, :-1] = appearance
     precision: Floats = np.asarray(np.linalg.inv(spread), float)
-    _fill_log_weights(
-        frame,
-        ground,
-        height,
-        predicted.expected,
-        predicted.ground,
-        precision,
-        log_volume,
-        predicted.height,
-        body.height_spread,
-        weight,
-    )
+    tracks = _TrackDensities(predicted.expected, predicted.ground, precision, log_volume, predicted.height)
+    _fill_log_weights(frame, ground, height, tracks, body.height_spread, weight)
     weight[:, -1] = math.log(body.prior_share)
     share = np.exp(weight - weight.max(1, keepdims=True))
     return np.asarray(share / share.sum(1, keepdims=True))
@@ -93,26 +94,17 @@ def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> L
 
 @kernel
 def _fill_log_weights(
-    frame: Ints,
-    ground: Floats,
-    height: Floats,
-    expected: Flags,
-    predicted_ground: Floats,
-    precision: Floats,
-    log_volume: Floats,
-    head_height: Floats,
-    height_spread: float,
-    weight: Floats,
+    frame: Ints, ground: Floats, height: Floats, tracks: _TrackDensities, height_spread: float, weight: Floats
 ) -> None:
     """Add the tracks' log-weights to weight (n, k + 1), nats; -inf outside the gate."""
     for i in range(len(frame)):
         t = frame[i]
-        for k in range(predicted_ground.shape[1]):
-            dx, dy = ground[i, 0] - predicted_ground[t, k, 0], ground[i, 1] - predicted_ground[t, k, 1]
-            inverse = precision[t, k]
+        for k in range(tracks.ground.shape[1]):
+            dx, dy = ground[i, 0] - tracks.ground[t, k, 0], ground[i, 1] - tracks.ground[t, k, 1]
+            inverse = tracks.precision[t, k]
             square = inverse[0, 0] * dx * dx + (inverse[0, 1] + inverse[1, 0]) * dx * dy + inverse[1, 1] * dy * dy
-            if not expected[t, k] or square > PLACE_GATE:
+            if not tracks.expected[t, k] or square > PLACE_GATE:
                 weight[i, k] = -np.inf
                 continue
-            above = max(height[i] - head_height[t, k], 0.0) / height_spread
-            weight[i, k] -= 0.5 * square + log_volume[t, k] + 0.5 * above * above
+            above = max(height[i] - tracks.height[t, k], 0.0) / height_spread
+            weight[i, k] -= 0.5 * square + tracks.log_volume[t, k] + 0.5 * above * above

@@ -22,6 +22,7 @@ from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.untrusted.bounded_files import read_text
 from stseg.records.tables import Tracks
+from stseg.trajectories.final_tracks import CommittedRows
 
 
 @dataclass(frozen=True)
@@ -105,16 +106,8 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     kept, constraints = answered.kept
     config = parse_config(run.provenance.config, f"{run.path}: configuration")
     rig = run.recording.reduced(config.foreground.body_rows).reduced_rig
-    tracks, identity = associated_tracks(
-        rig,
-        config,
-        run.committed[kept],
-        run.committed_events,
-        run.appearance,
-        run.recording.rig,
-        constraints,
-        run.known_people,
-    )
+    rows = CommittedRows(run.committed[kept], run.committed_events, run.appearance, run.known_people)
+    tracks, identity = associated_tracks(rig, config, rows, run.recording.rig, constraints)
     _require_obeyed(constraints, answered.places, identity)
     numbers = _numbers(old[kept], identity, np.concatenate([tracks.events["id"], tracks.events["other"]]))
     solved = Tracks(*(_numbered(rows, numbers) for rows in (tracks.trajectory, tracks.boxes, tracks.events)))

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,19 @@ from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, rena
 from stseg.trajectories.smoother import fill_gaps, interpolated_rows, smooth_places
 
 
+class CommittedRows(NamedTuple):
+    """Rows of a whole run as its tracker committed them."""
+
+    trajectory: Rows
+    """TRAJECTORY (n,)."""
+    events: Rows
+    """EVENT (k,)."""
+    appearance: Rows
+    """APPEARANCE (l,): what the detections look like."""
+    known_people: Rows = NO_KNOWN_PEOPLE
+    """KNOWN_PERSON (m,): people of earlier recordings."""
+
+
 @dataclass(frozen=True)
 class FinalTracks:
     """The tracks of a run."""
@@ -45,28 +59,22 @@ class FinalTracks:
 
 
 def final_tracks(
-    committed: Rows,
-    events: Rows,
-    appearance: Rows,
-    frame_rate: float,
-    border: Border,
-    config: Config,
-    constraints: Constraints = NO_CONSTRAINTS,
-    known_people: Rows = NO_KNOWN_PEOPLE,
+    rows: CommittedRows, frame_rate: float, border: Border, config: Config, constraints: Constraints = NO_CONSTRAINTS
 ) -> FinalTracks:
-    """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows.
+    """The tracks of a run from its committed rows, under constraints on those of the trajectory.
 
-    People of earlier recordings, KNOWN_PERSON (k,), keep their ids; all others have greater ones.
+    People of earlier recordings keep their ids; all others have greater ones.
     """
+    committed = rows.trajectory
     bridged, sizes = bridged_rows(committed, frame_rate, config)
-    problem = IdentityProblem.of(bridged, sizes, appearance, frame_rate, border, config, constraints)
+    problem = IdentityProblem.of(bridged, sizes, rows.appearance, frame_rate, border, config, constraints)
     linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
     named = linked.identity[: len(committed)]
     kept, dropped = drop_short(bridged[: len(committed)], frame_rate, config.tracking)
     identity = np.where(np.isin(named, kept["id"]), named, 0)
-    met = _encounters(events, _Names(committed, identity), frame_rate, config.tracking)
-    renamed = _renamed(events, _Names(committed, named), linked.links)
+    met = _encounters(rows.events, _Names(committed, identity), frame_rate, config.tracking)
+    renamed = _renamed(rows.events, _Names(committed, named), linked.links)
     tracks = fill_gaps(bridged[np.isin(bridged["id"], kept["id"])], frame_rate, config.tracking, True)
     smoothed = smooth_places(tracks, frame_rate, config.motion)
     doubts = doubt_events(smoothed, bridged[: len(committed)], problem, constraints)
@@ -75,8 +83,8 @@ def final_tracks(
     least = config.tracking.return_probability
     if least == 1:
         return whole
-    whole = _with_later_ids(whole, int(known_people["id"].max(initial=0)))
-    returns = returns_of(problem, whole.identity, bridged, least, constraints, known_people)
+    whole = _with_later_ids(whole, int(rows.known_people["id"].max(initial=0)))
+    returns = returns_of(problem, whole.identity, bridged, least, constraints, rows.known_people)
     return _with_returns(whole, returns, frame_rate)
 
 

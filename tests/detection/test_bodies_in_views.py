@@ -16,7 +16,7 @@ import stseg
 from stseg.arrays import Flags, Floats, Singles
 from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, fill_inside, fill_match, half_square
 from stseg.bodies.outlines import Pillars, outlines, sums_inside
-from stseg.bodies.pillar_index import PillarIndex, fill_fits
+from stseg.bodies.pillar_index import PillarIndex, ViewBoxes, fill_fits
 from stseg.bodies.pillars import BodyTable
 from stseg.bodies.views import PixelView, ViewObservation
 from stseg.commands.simulate import simulate
@@ -57,8 +57,9 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
     fill_match(bodies, edges, tolerance, belief, WIDTH, HEIGHT, match)
     index = PillarIndex.of(bodies, (int(WIDTH), int(HEIGHT)))
     pillar, fit = np.empty(len(bodies), np.int32), np.empty(len(bodies))
-    for one in zip(edges, tolerance, belief, strict=True):
-        number = fill_fits(index, bodies, *one, WIDTH, HEIGHT, -30.0, pillar, fit)
+    boxes = ViewBoxes(edges, tolerance, belief, WIDTH, HEIGHT)
+    for b in range(len(edges)):
+        number = fill_fits(index, bodies, boxes, b, -30.0, pillar, fit)
         assert (fit[:number] > -30.0).all()
         np.maximum.at(best, pillar[:number], fit[:number])
     for i, body in enumerate(bodies):

@@ -23,6 +23,7 @@ from stseg.records.people import Explanation
 from stseg.records.tables import Tracks
 from stseg.tracking.filter.assignment import assign
 from stseg.tracking.filter.track_filter import TrackFilter
+from stseg.trajectories.final_tracks import CommittedRows
 
 KINDS = ("pixels", "boxes")
 FRAMES = 20
@@ -117,7 +118,8 @@ def moving_ghosts(kind: str) -> Run:
     frames = [FrameSet(f, tuple(show(camera, strollers(f)) for camera in rig.cameras)) for f in range(FRAMES)]
     steps = list(run_session(pipeline, [ViewForeground()] * 2, frames, 0, lambda _: None))
     rows, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
-    return Run(steps, pipeline.finished(rows, events, np.concatenate([s.appearance for s in steps]))[0])
+    committed = CommittedRows(rows, events, np.concatenate([s.appearance for s in steps]))
+    return Run(steps, pipeline.finished(committed)[0])
 
 
 @pytest.mark.parametrize("kind", KINDS)

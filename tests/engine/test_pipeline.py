@@ -27,6 +27,7 @@ from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import FrameSet
 from stseg.kernels.accelerate import COMPILED
 from stseg.records.tables import CANDIDATE, RATES, TIMING, Tracks
+from stseg.trajectories.final_tracks import CommittedRows
 
 FRAMES, MASKED, BLIND = (40, 17, 17) if COMPILED else (12, 7, 7)
 RIG = room()
@@ -66,11 +67,8 @@ def run(
     advanced, foregrounds = list[int](), [ViewForeground() for _ in RIG.cameras]
     steps = list(run_session(pipeline, foregrounds, frame_sets, first, advanced.append, iter(cores).__next__))
     trajectory = np.concatenate([step.commit.trajectory for step in steps])
-    tracks, identity = pipeline.finished(
-        trajectory,
-        np.concatenate([step.commit.events for step in steps]),
-        np.concatenate([step.appearance for step in steps]),
-    )
+    events, appearance = (np.concatenate([getattr(one, name) for one in steps]) for name in ("events", "appearance"))
+    tracks, identity = pipeline.finished(CommittedRows(trajectory, events, appearance))
     return Run(steps, tracks, identity, advanced)
 
 

@@ -19,7 +19,7 @@ from stseg.identities.review.answered_constraints import answered_rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.tables import APPEARANCE, COLOURS, EVENT, FEATURES, KNOWN_PERSON
-from stseg.trajectories.final_tracks import FinalTracks, final_tracks
+from stseg.trajectories.final_tracks import CommittedRows, FinalTracks, final_tracks
 
 SPREAD = np.full(3, 25.0)
 PEOPLE = np.array([[6.0, 0, 0], [-6.0, 0, 0], [0, 6.0, -3], [0, -6.0, 3]])
@@ -125,8 +125,7 @@ def scene() -> tuple[Rows, Rows, Rows]:
 
 
 def whole(config: Config, constraints: Constraints = NO_CONSTRAINTS) -> FinalTracks:
-    rows, events, looks = scene()
-    return final_tracks(rows, events, looks, RATE, BORDER, config, constraints)
+    return final_tracks(CommittedRows(*scene()), RATE, BORDER, config, constraints)
 
 
 def returning(least: float) -> Config:
@@ -194,7 +193,7 @@ def test_people_of_an_earlier_run_keep_their_ids() -> None:
     assert known["appearance_count"].tolist() == [240] * 5 and known["height"] == pytest.approx(1.7, abs=0.02)
     rows, looks = coloured({1: 4, 2: 9, 3: 1, 4: 8, 5: 7}, seed=2)
     birth = np.array([(0, b"birth", 2, 0, b"")], EVENT)
-    found = final_tracks(rows, birth, looks, RATE, BORDER, returning(0.99), known_people=known)
+    found = final_tracks(CommittedRows(rows, birth, looks, known), RATE, BORDER, returning(0.99))
     names = [np.unique(found.identity[rows["id"] == track]).tolist() for track in range(1, 6)]
     assert names[0] == [14] and names[2] == [11]
     assert all(one > 15 for track in (1, 3, 4) for one in names[track])
@@ -211,7 +210,7 @@ def test_nobody_of_whom_nothing_is_known_is_recognised() -> None:
     known = known_people(rows, looks[:0])
     assert np.isnan(known["height"]).all() and not known["height_count"].any() and not known["appearance_count"].any()
     rows, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=2)
-    found = final_tracks(rows, np.zeros(0, EVENT), looks, RATE, BORDER, returning(0.9), known_people=known)
+    found = final_tracks(CommittedRows(rows, np.zeros(0, EVENT), looks, known), RATE, BORDER, returning(0.9))
     assert found.identity.min() > 5
 
 

@@ -34,6 +34,7 @@ from stseg.trackers import Commit, FusedFrame
 from stseg.trackers.rows import event_rows
 from stseg.tracking.windows.encounters import encounters, touches
 from stseg.tracking.windows.windows import windows
+from stseg.trajectories.final_tracks import CommittedRows
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
 
@@ -127,7 +128,7 @@ def switches(name: str, kind: str, stop: int) -> int:
     foreground = [ViewForeground() for _ in rig.cameras]
     commits = [step.commit for step in run_session(pipeline, foreground, frames, 0, lambda _: None)]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
-    tracks, _ = pipeline.finished(rows, events, np.zeros(0, APPEARANCE))
+    tracks, _ = pipeline.finished(CommittedRows(rows, events, np.zeros(0, APPEARANCE)))
     scores = evaluate(np.concatenate([seen.truth for seen in film]), tracks.trajectory)
     assert scores.misses <= 0.02 * scores.truths
     return scores.switches

@@ -13,7 +13,7 @@ from stseg.identities.search.constraints import Constraints
 from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import APPEARANCE, TRAJECTORY
 from stseg.trackers.rows import event_rows
-from stseg.trajectories.final_tracks import FinalTracks, final_tracks
+from stseg.trajectories.final_tracks import CommittedRows, FinalTracks, final_tracks
 from stseg.trajectories.smoother import smooth_places, smoothed_paths
 
 
@@ -29,7 +29,7 @@ def lives(rows: Rows) -> Rows:
 
 
 def whole(rows: Rows, events: Rows) -> FinalTracks:
-    return final_tracks(rows, events, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG)
+    return final_tracks(CommittedRows(rows, events, np.zeros(0, APPEARANCE)), RATE, BORDER, CONFIG)
 
 
 def story(events: Rows) -> list[tuple[int, bytes, int, int]]:
@@ -89,7 +89,7 @@ def test_a_meeting_that_no_evidence_decides_is_a_doubt(other_height: float, doub
     assert [(int(e["id"]), int(e["other"])) for e in found] == doubts
     assert all(e["frame"] == 80 and e["reason"].startswith(b"exchanged in this encounter with a prob") for e in found)
     known = Constraints.of([(next_row(rows, 1, 40), next_row(rows, 1, 120))], [])
-    told = final_tracks(rows, events_of(), np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, known)
+    told = final_tracks(CommittedRows(rows, events_of(), np.zeros(0, APPEARANCE)), RATE, BORDER, CONFIG, known)
     assert not (told.events["kind"] == b"doubt").any(), "an answer decides it"
 
 

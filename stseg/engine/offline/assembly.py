@@ -21,6 +21,7 @@ from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
 from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
+from stseg.trajectories.final_tracks import CommittedRows
 
 _BLOCK = 64
 """Frames of the volume read at a time."""
@@ -90,16 +91,9 @@ def _associated(job: Job, finished: Sequence[FinishedSegment]) -> tuple[Stitched
         before = segment.stop
         appearance.append(run.appearance)
     joined = stitcher.joined()
-    tracks, identity = finished_tracks(
-        job.read.reduced_rig,
-        job.config,
-        find_tracker(job.tracker),
-        joined.committed,
-        joined.events,
-        np.concatenate(appearance),
-        job.recording.rig,
-        job.known,
-    )
+    rows = CommittedRows(joined.committed, joined.events, np.concatenate(appearance), job.known)
+    tracker = find_tracker(job.tracker)
+    tracks, identity = finished_tracks(job.read.reduced_rig, job.config, tracker, rows, job.recording.rig)
     return joined, tracks, identity
 
 
