@@ -16,6 +16,7 @@ from stseg.config import Config
 from stseg.config.keys import describe, is_user_key, values
 from stseg.errors import ConfigError
 from stseg.io.toml import parse_toml, toml_value
+from stseg.io.untrusted.bounded_files import read_text, reading
 from stseg.io.untrusted.values import abbreviated, finite_number, one_of
 
 _OPTION = "--set"
@@ -48,12 +49,10 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
     """
     if path is None:
         return parse_config("", _OPTION, assignments)
-    try:
-        return parse_config(Path(path).read_bytes().decode("utf-8-sig"), str(path), assignments)
-    except OSError as error:
-        raise ConfigError(path, "", error.strerror or error, "a configuration file") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(path, "", f"what is not TOML ({error})", "TOML") from error
+    path = Path(path)
+    with reading(path, "a configuration in TOML", ConfigError):
+        text = read_text(path)
+    return parse_config(text, str(path), assignments)
 
 
 def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Config:

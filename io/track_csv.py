@@ -116,25 +116,27 @@ class _Sheet:
 def read_rows(
     path: Path, needed: Sequence[str], most: int, *, skip_blanks: bool = False
 ) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header and first rows of a CSV file, `most` of them, each with the number of its line.
+    """Header and rows of a CSV file, each with the number of its line.
 
     With `skip_blanks`, blanks before a quotation mark are no part of the text. FormatError where the file cannot be
-    read, or lacks one of the columns `needed`.
+    read, lacks one of the columns `needed`, or has more than `most` rows.
     """
     try:
         require_regular(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file, skipinitialspace=skip_blanks)
             header = [name.strip().lower() for name in next(reader, [])]
-            rows = list(islice(((reader.line_num, row) for row in reader if any(map(str.strip, row))), most))
+            rows = list(islice(((reader.line_num, row) for row in reader if any(map(str.strip, row))), most + 1))
     except OSError as error:
         raise FormatError(path, "", error.strerror or error, "a CSV file that can be read") from error
-    except (ValueError, csv.Error) as error:
+    except (UnicodeDecodeError, csv.Error) as error:
         raise FormatError(path, "", "something that is not text", "a CSV file") from error
     if missing := [name for name in needed if name not in header]:
         found = ",".join(header)[: limits.NAME] or "nothing"
         raise FormatError(path, "header", found, f"columns {','.join(needed)} (no {', '.join(missing)})")
     require_once(path, header)
+    if len(rows) > most:
+        raise FormatError(path, f"line {rows[most][0]}", f"more than {most} rows", "no more")
     for line, row in rows:
         if any(map(str.strip, row[len(header) :])):
             raise FormatError(path, f"line {line}", f"{len(row)} cells", f"{len(header)}, as in the header")
@@ -154,8 +156,8 @@ def _read_sheet(path: Path) -> _Sheet:
 def _refuse_crowds(path: Path, table: Rows) -> None:
     frames, counts = np.unique(table["frame"], return_counts=True)
     if counts.max(initial=0) > limits.PEOPLE_PER_FRAME:
-        found = f"{counts.max()} rows of frame {frames[counts.argmax()]}"
-        raise FormatError(path, "", found, f"at most {limits.PEOPLE_PER_FRAME} people in a frame")
+        place = f"frame {frames[counts.argmax()]}"
+        raise FormatError(path, place, f"{counts.max()} rows", f"at most {limits.PEOPLE_PER_FRAME} people in a frame")
 
 
 def _repeats(table: Rows) -> Flags:

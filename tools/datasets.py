@@ -5,8 +5,6 @@ python tools/datasets.py wildtrack-truth annotations_positions TABLE.csv
 python tools/datasets.py wildtrack-boxes annotations_positions FOLDER        a table a view
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator

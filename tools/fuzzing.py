@@ -6,10 +6,7 @@ python tools/fuzzing.py --target run.h5       one of them
 Failures are printed with their seeds; the first file of each is kept in the folder `fuzz-failures`.
 """
 
-from __future__ import annotations
-
 import argparse
-import os
 import sys
 import tempfile
 import time
@@ -32,7 +29,6 @@ def main() -> int:
     targets = [target for target in TARGETS if not given.target or target.name in given.target]
     failed = 0
     for target in targets:
-        os.environ["PYTEST_CURRENT_TEST"] = target.name  # `tools/mutants.py` notes it
         until = time.monotonic() + 60 * given.minutes / len(targets)
         count, failures = fuzz(target, given.seed, until, sys.maxsize - given.seed, given.first)
         failed += len(failures)

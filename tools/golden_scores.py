@@ -6,8 +6,6 @@ SCORE.PY is the reference scorer (`--truth --tracks [--gate --area --frames --ig
 output). It needs TrackEval, which brings its own OpenCV along: run this in an environment of its own.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

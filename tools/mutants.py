@@ -8,10 +8,10 @@ returns its text, one part of a question `is_...` is always right, a flag of `op
 the tests run once while every check is watched, also in the processes that they start: a check that refuses something
 notes the test. Then the checks are broken, one after the other, and the tests of their notes run until one fails.
 With `--fuzz` all targets of fuzzing take the tests' place, for five minutes; then, for so many seconds, the target in
-which the broken check refused most often. Checks that refuse in none are not broken.
+which the broken check refused most often. Checks that refuse in none are not broken. Where fuzzing without a check ends
+without a failure, and takes or refuses all files of its notes, ten or more, as with it, others refuse them: the check
+makes no difference, and is no part of the share.
 """
-
-from __future__ import annotations
 
 import argparse
 import ast
@@ -33,7 +33,10 @@ ESCAPES = ("printable", "escape", "abbreviated", "mask_passwords", "quote")
 PREFIXES = ("require", "refuse", "flock", "lockf", "verify", "check")
 FLAGS = ("O_NOFOLLOW", "O_EXCL", "O_NONBLOCK")
 COPY = ROOT / "build" / "mutants"
-NOTES = COPY / "notes"
+NOTES, ANSWERS = COPY / "notes", COPY / "answers"
+LEAST_FILES = 10
+TESTS = ("-m", "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider")
+FUZZING = ("tools/fuzzing.py", "--minutes")
 WATCH = f"""
 import os
 def note(check):
@@ -109,20 +112,19 @@ def watched(place: str, text: str) -> str:
     return ast.unparse(ast.fix_missing_locations(tree))
 
 
-def tests_pass(words: Sequence[str], seconds: float | None = None) -> bool:
-    """Whether tests pass in the copy."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", *words]
-    sink, own = None if seconds is None else subprocess.DEVNULL, os.environ | {"PYTHONPATH": str(COPY)}
+def passes(words: Sequence[str], seconds: float | None = None) -> bool:
+    """Whether a program of Python passes in the copy."""
+    own = os.environ | {"PYTHONPATH": str(COPY), "FUZZ_ANSWERS": str(ANSWERS)}
+    sink, program = None if seconds is None else subprocess.DEVNULL, [sys.executable, *words]
+    ANSWERS.unlink(missing_ok=True)
     with suppress(subprocess.TimeoutExpired):
-        return subprocess.run(command, cwd=COPY, env=own, timeout=seconds, stdout=sink, check=False).returncode == 0
+        return subprocess.run(program, cwd=COPY, env=own, timeout=seconds, stdout=sink, check=False).returncode == 0
     return False
 
 
-def fuzzing_passes(seconds: float, *words: str) -> bool:
-    """Whether fuzzing in the copy finds nothing."""
-    command = [sys.executable, "tools/fuzzing.py", "--minutes", str(seconds / 60), *words]
-    own = os.environ | {"PYTHONPATH": str(COPY)}
-    return subprocess.run(command, cwd=COPY, env=own, capture_output=True, check=False).returncode == 0
+def answers() -> dict[str, str]:
+    """The last fuzzing's files, by target and seed, and whether each was refused."""
+    return dict(line.rsplit(" ", 1) for line in ANSWERS.read_text().splitlines()) if ANSWERS.exists() else {}
 
 
 def main() -> None:
@@ -133,8 +135,7 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=5, help="most functions of tests for a check")
     parser.add_argument("--fuzz", type=float, help="seconds of fuzzing for each check, in place of tests")
     given, words = parser.parse_known_args()
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True)
-    names = listed.stdout.splitlines()
+    names = subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).splitlines()
     for name in names:
         (COPY / name).parent.mkdir(parents=True, exist_ok=True)
         (COPY / name).unlink(missing_ok=True)
@@ -144,30 +145,39 @@ def main() -> None:
     for name, text in texts.items():
         (COPY / name).write_text(watched(name, text))
     NOTES.unlink(missing_ok=True)
-    fuzzing_passes(300) if given.fuzz else tests_pass(words)
-    tests = defaultdict[str, Counter[str]](Counter)
-    for noted, _, test in (line.partition(" ") for line in NOTES.read_text().splitlines()):
-        tests[noted][test.partition("[")[0].partition(" (")[0]] += 1
+    if not passes([*FUZZING, "5"] if given.fuzz else [*TESTS, *words]) and given.fuzz:
+        sys.exit("something fails before a check is broken")
+    before, tests, files = answers(), defaultdict[str, Counter[str]](Counter), defaultdict[str, set[str]](set)
+    for noted, test in (line.split(" ", 1) for line in NOTES.read_text().splitlines() if " " in line.rstrip()):
+        files[noted].add(test)
+        tests[noted][test.partition("[")[0].partition(" ")[0]] += 1
     for name, text in texts.items():
         (COPY / name).write_text(text)
     every = [(name, k) for name, text in texts.items() for k, _ in enumerate(checks(ast.parse(text)))]
     every = [one for one in every if one[0].startswith(given.only)]
     every = [one for one in every if not given.fuzz or f"{one[0]}#{one[1]}" in tests]
-    chosen, noticed = random.Random(given.every).sample(every, len(every) // given.every), 0
+    chosen, verdicts = random.Random(given.every).sample(every, len(every) // given.every), Counter[str]()
     for name, number in sorted(chosen):
         tree = ast.parse(texts[name])
         check = list(checks(tree))[number]
         check.replace(check.without)
         (COPY / name).write_text(ast.unparse(ast.fix_missing_locations(tree)))
-        seen = [test for test, _ in tests[f"{name}#{number}"].most_common(given.most) if test]
-        if given.fuzz:
-            is_noticed = not fuzzing_passes(given.fuzz, "--first", "--target", seen[0])
-        else:
-            is_noticed = bool(seen) and not tests_pass(["-x", *seen], 300)
+        key = f"{name}#{number}"
+        seen = [test for test, _ in tests[key].most_common(given.most)]
+        run = [*FUZZING, str(given.fuzz / 60), "--first", "--target", seen[0]] if given.fuzz else [*TESTS, "-x", *seen]
+        verdict = "noticed" if seen and not passes(run, (given.fuzz or 0) + 300) else "missed"
+        common = files[key] & before.keys() & (after := answers()).keys()
+        if len(common) >= LEAST_FILES and verdict == "missed" and all(before[one] == after[one] for one in common):
+            verdict = "no difference"
         (COPY / name).write_text(texts[name])
-        noticed += is_noticed
-        print(f"| {name}:{check.line} | {check.kind} | {is_noticed} | {' '.join(seen)} |", flush=True)
-    print(f"{len(chosen)} of {len(every)} checks were left out; noticed: {100 * noticed / len(chosen):.1f} %")
+        if given.fuzz and verdict == "noticed":  # unless the next file is answered wrongly with the check, too
+            seed = str(1 + max((int(file.rsplit(" ", 1)[1]) for file in answers() if " " in file), default=-1))
+            if not passes([*FUZZING, "0.05", "--first", "--target", seen[0], "--seed", seed]):
+                verdict = "missed"
+        verdicts[verdict] += 1
+        print(f"| {name}:{check.line} | {check.kind} | {verdict} | {' '.join(seen)} |", flush=True)
+    share = verdicts["noticed"] / max(len(chosen) - verdicts["no difference"], 1)
+    print(f"{len(chosen)} of {len(every)} checks were left out: {dict(verdicts)}; noticed: {100 * share:.1f} %")
 
 
 if __name__ == "__main__":

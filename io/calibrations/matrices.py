@@ -17,7 +17,7 @@ from stseg.geometry.fits import fit_vertical, homogeneous
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.matlab_file import parse_mat
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import read_bytes, read_text
+from stseg.io.untrusted.bounded_files import read_bytes, read_text, reading
 from stseg.io.untrusted.numpy_files import read_npy, read_npz
 from stseg.io.untrusted.safe_hdf5 import open_hdf5, read_whole
 from stseg.io.untrusted.values import parse_numbers
@@ -121,11 +121,7 @@ def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[
 
 
 def _rows(file: Path) -> list[list[float]]:
-    try:
+    with reading(file, _PLANES):
         text = read_text(file)
-    except OSError as error:
-        raise FormatError(file, "", error.strerror or error, _PLANES) from error
-    except ValueError as error:
-        raise FormatError(file, "", "what is no text", _PLANES) from error
     lines = map(str.split, text.translate(str.maketrans("[](){},;", " " * 8)).splitlines())
     return [row for words in lines if len(words) == 3 and (row := parse_numbers(words)) is not None]

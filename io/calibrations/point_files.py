@@ -37,9 +37,7 @@ def read_points(path: Path) -> list[PointTable]:
     columns are ignored. FormatError where the file cannot be read, a column is missing, or a cell is no number.
     """
     rows: dict[str, list[tuple[int, list[float]]]] = {}
-    header, given = read_rows(path, _NEEDED, limits.POINTS + 1, skip_blanks=True)
-    if len(given) > limits.POINTS:
-        raise FormatError(path, "", f"more than {limits.POINTS} points", "no more")
+    header, given = read_rows(path, _NEEDED, limits.POINTS, skip_blanks=True)
     for line, words in given:
         row = dict(zip(header, words, strict=False))
         cells = [_number(path, line, name, row) for name in ("u", "v", "x", "y", "z")]

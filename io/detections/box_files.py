@@ -72,8 +72,8 @@ def read_boxes(
     order = np.argsort(frame, kind="stable")
     crowded = np.flatnonzero(frame[order][limits.BOXES_PER_FRAME :] == frame[order][: -limits.BOXES_PER_FRAME])
     if len(crowded):
-        found = f"more than {limits.BOXES_PER_FRAME} boxes in frame {frame[order][crowded[0]] + first_frame}"
-        raise FormatError(path, "", found, "no more")
+        place = f"frame {frame[order][crowded[0]] + first_frame}"
+        raise FormatError(path, place, f"more than {limits.BOXES_PER_FRAME} boxes", "no more")
     length = int(frame.max()) + 1 if frames is None else frames
     features = None if appearance is None else read_features(appearance, len(values))[order]
     return Detections(frame[order], values[order, 1:5], score[order], frames=length, features=features)
@@ -112,7 +112,7 @@ def _read_lines(path: Path) -> _Lines:
         number.append(line)
         numbers.extend(_numbers(path, line, fields, columns))
         if len(number) > limits.ROWS:
-            raise FormatError(path, "", f"more than {limits.ROWS} rows", "no more")
+            raise FormatError(path, f"line {line}", f"more than {limits.ROWS} rows", "no more")
     values = np.array(numbers, float).reshape(-1, len(columns))
     if is_mot:
         values[:, 5:][values[:, 5:] == -1] = 1

@@ -103,15 +103,15 @@ class DetectionList:
         self, place: str, frame: int, box: Values, score: object = 1.0, label: str = "", mask: Mask | None = None
     ) -> None:
         """Add a detection: left, top, width, height in pixels; `place` is where it stands in the file."""
-        values = (number(self._path, place, "box", one) for one in ([box] if isinstance(box, str) else box))
+        if abs(frame) > limits.FRAMES or len(self._numbers) >= limits.ROWS:
+            found = f"frame {abbreviated(frame)}, row {len(self._numbers) + 1}"
+            raise FormatError(self._path, place, found, f"at most {limits.FRAMES} frames and {limits.ROWS} rows")
+        values = (number(self._path, place, "box", one) for one in (box if isinstance(box, list | tuple) else [box]))
         row = (float(frame), *values, number(self._path, place, "score", score))
         if len(row) != len(LEAST_NUMBERS):
             raise FormatError(self._path, place, f"a box of {len(row) - 2} numbers", "4 numbers")
         if row[3] < 0 or row[4] < 0:
             raise FormatError(self._path, place, f"a box {row[3]:g} by {row[4]:g} pixels", "0 or more pixels")
-        if abs(frame) > limits.FRAMES or len(self._numbers) >= limits.ROWS:
-            found = f"frame {frame:.0f}, row {len(self._numbers) + 1}"
-            raise FormatError(self._path, place, found, f"at most {limits.FRAMES} frames and {limits.ROWS} rows")
         if not 0 <= row[5] <= 1:
             raise FormatError(self._path, place, f"score {row[5]:g}", "a score of 0..1")
         self._numbers.append(row)
@@ -122,7 +122,7 @@ class DetectionList:
         self, place: str, frame: int, corners: Values, score: object = 1.0, label: str = "", mask: Mask | None = None
     ) -> None:
         """Add a detection by its left, top, right and bottom edges."""
-        if len(corners) != 4 or isinstance(corners, str):
+        if not isinstance(corners, list | tuple) or len(corners) != 4:
             raise FormatError(self._path, place, f"a box {corners!r}"[:100], "4 numbers")
         left, top, right, bottom = (number(self._path, place, "box", one) for one in corners)
         self.add(place, frame, (left, top, right - left, bottom - top), score, label, mask)
@@ -131,10 +131,11 @@ class DetectionList:
         """All that were added."""
         values = np.array(self._numbers, float).reshape(-1, len(LEAST_NUMBERS))
         if frames is not None and not 0 <= frames <= limits.FRAMES:
-            raise FormatError(self._path, "", f"{frames:.3g} frames", f"at most {limits.FRAMES}")
-        _, crowds = np.unique(values[:, 0], return_counts=True)
+            raise FormatError(self._path, "frames", f"{frames:.3g} of them", f"at most {limits.FRAMES}")
+        crowded, crowds = np.unique(values[:, 0], return_counts=True)
         if crowds.max(initial=0) > limits.BOXES_PER_FRAME:
-            raise FormatError(self._path, "", f"{crowds.max()} boxes in a frame", f"at most {limits.BOXES_PER_FRAME}")
+            place = f"frame {crowded[crowds.argmax()]:.0f}"
+            raise FormatError(self._path, place, f"{crowds.max()} boxes", f"at most {limits.BOXES_PER_FRAME}")
         label = tuple(self._label) if any(self._label) else ()
         mask = tuple(self._mask) if any(one is not None for one in self._mask) else ()
         return Detections(values[:, 0].astype(np.int64), values[:, 1:5], values[:, 5], label, mask, frames)
@@ -159,8 +160,6 @@ def read_json(path: Path) -> Any:
         text = read_text(path, limits.DETECTIONS_FILE)
     except OSError as error:
         raise SourceError(path, "", error.strerror or error, "a file of detections") from error
-    except UnicodeDecodeError as error:
-        raise FormatError(path, "", "bytes that are no text", "JSON in UTF-8") from error
     except ValueError as error:
         raise FormatError(path, "", error, "a file of detections") from error
     try:

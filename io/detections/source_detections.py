@@ -87,20 +87,17 @@ def _wanted(found: Detections, classes: Sequence[str], least_score: float) -> Fl
 
 def _length(source: Source, found: Detections, kept: Detections) -> int:
     """Number of frames: the rig's, the source's, or up to the last frame with a detection."""
-    if len(kept) and int(kept.frame.min()) < 0:
-        found_frame = f"frame {int(kept.frame.min()) + source.first_frame}"
-        raise FormatError(source.path, "", found_frame, f"a frame from first_frame = {source.first_frame} on")
-    length = source.frames or (found.frames - source.first_frame if found.frames is not None else None)
-    if length is None:
-        if not len(kept):
-            classes = ", ".join(f"{name} ({count})" for name, count in found.classes().items())
-            wanted = f"no detections of {', '.join(source.classes)}" if source.classes else "no detections"
-            raise SourceError(source.path, "", f"{wanted}; classes are {classes or 'not given'}", "some detections")
-        return int(found.frame.max()) - source.first_frame + 1
-    if len(kept) and int(kept.frame.max()) >= length:
-        found_frame = f"frame {int(kept.frame.max()) + source.first_frame}"
-        raise FormatError(source.path, "", found_frame, f"a frame below {length + source.first_frame}")
-    return length
+    first, here = source.first_frame, "detections there"
+    length = source.frames or (found.frames - first if found.frames is not None else None)
+    if length is None and not len(kept):
+        classes = ", ".join(f"{name} ({count})" for name, count in found.classes().items())
+        wanted = f"no detections of {', '.join(source.classes)}" if source.classes else "no detections"
+        raise SourceError(source.path, "", f"{wanted}; classes are {classes or 'not given'}", "some detections")
+    if (least := int(kept.frame.min(initial=0))) < 0:
+        raise FormatError(source.path, f"frame {least + first}", here, f"a frame from first_frame = {first} on")
+    if length is not None and (last := int(kept.frame.max(initial=-1))) >= length:
+        raise FormatError(source.path, f"frame {last + first}", here, f"a frame below {length + first}")
+    return int(found.frame.max()) - first + 1 if length is None else length
 
 
 def instance_image(found: Detections, rows: Sequence[int], size: tuple[int, int]) -> NDArray[np.uint16]:

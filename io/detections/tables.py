@@ -10,7 +10,7 @@ from stseg.io.detections.record import DetectionList, Detections, Request, numbe
 from stseg.io.extras import load_extra
 from stseg.io.track_csv import read_rows
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import read_text
+from stseg.io.untrusted.bounded_files import read_text, reading
 from stseg.io.untrusted.values import one_of, parse_number
 
 COLUMNS = ("frame", "left", "top", "width", "height", "right", "bottom", "x", "y", "score", "class")
@@ -142,7 +142,9 @@ def read_ground_truth(request: Request) -> Detections:
     no file says which.
     """
     found = DetectionList(request.path)
-    for row, line in enumerate(read_text(request.path, limits.DETECTIONS_FILE).splitlines(), 1):
+    with reading(request.path, "a text file"):
+        lines = read_text(request.path, limits.DETECTIONS_FILE).splitlines()
+    for row, line in enumerate(lines, 1):
         if not line.strip():
             continue
         place = f"line {row}"

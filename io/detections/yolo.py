@@ -11,7 +11,7 @@ from stseg.io.detections.masks import Mask, flat_polygons, polygons
 from stseg.io.detections.record import DetectionList, Detections, Request, last_numbers, number, required_value
 from stseg.io.recording.source_files import CLASS_LISTS, class_lists
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import read_text
+from stseg.io.untrusted.bounded_files import read_text, reading
 
 _POSE = frozenset(5 + keypoints + after for keypoints in (34, 51) for after in (0, 1, 2))
 """Numbers in a line of a pose model: box, 17 keypoints of 2 or 3 numbers, and perhaps confidence and track id."""
@@ -113,10 +113,8 @@ def _yaml_names(text: str) -> dict[int, str]:
 
 
 def _text(path: Path) -> str:
-    try:
+    with reading(path, "a text file", SourceError):
         return read_text(path, limits.DETECTIONS_FILE)
-    except (OSError, UnicodeDecodeError) as error:
-        raise SourceError(path, "", error, "a text file") from error
 
 
 def is_frame_of_results(data: Any) -> bool:

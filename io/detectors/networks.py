@@ -14,7 +14,7 @@ from stseg.errors import FormatError, SourceError
 from stseg.io.detectors.onnx_header import OnnxHeader, parse_header
 from stseg.io.extras import load_extra
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import read_bytes
+from stseg.io.untrusted.bounded_files import read_bytes, reading
 
 _FLOAT32, _INT64, _FLOAT16 = 1, 7, 10
 """Types of numbers in ONNX files."""
@@ -135,12 +135,8 @@ def describe(header: OnnxHeader) -> str:
 
 
 def _read(path: Path) -> bytes:
-    try:
+    with reading(path, _MODEL, SourceError):
         return read_bytes(path, limits.MODEL_FILE)
-    except OSError as error:
-        raise SourceError(path, "", error.strerror or error, _MODEL) from error
-    except ValueError as error:
-        raise SourceError(path, "", error, _MODEL) from error
 
 
 def _onnxruntime() -> Any:

@@ -32,7 +32,7 @@ from stseg.io.recording.rig_text import FORMAT, format_rig
 from stseg.io.recording.source_files import recording_files
 from stseg.io.toml import ANY, Table, parse_toml
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import read_text
+from stseg.io.untrusted.bounded_files import read_text, reading
 
 _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
 _CLOCKS: tuple[ClockSource, ...] = ("auto", "stamps", "count")
@@ -60,14 +60,8 @@ def read_recording(path: str | Path) -> Recording:
         Where a camera's geometry is singular or sees nothing of the area.
     """
     path = Path(path)
-    try:
+    with reading(path, "a rig file in TOML", RigError):
         text = read_text(path)
-    except OSError as error:
-        raise RigError(path, "", error.strerror or error, "a rig file") from error
-    except UnicodeDecodeError as error:
-        raise RigError(path, "", f"bytes that are not UTF-8 at {error.start}", "TOML, which is UTF-8") from error
-    except ValueError as error:
-        raise RigError(path, "", error, "a rig file") from error
     return parse_rig(text, path)
 
 

@@ -21,6 +21,7 @@ from stseg.io.recording.source_files import source_files
 from stseg.io.runfile.reading.hdf5_reading import dataset_text, read_attribute
 from stseg.io.toml import parse_toml
 from stseg.io.untrusted import limits
+from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.safe_hdf5 import read_whole
 from stseg.version import __version__
 
@@ -149,6 +150,7 @@ def sampled_checksum(source: Source) -> str:
     try:
         files = list(source_files(source))
         for path in files:
+            require_regular(path)
             state = path.stat()
             digest.update(os.fsencode(f"{path.name}/{state.st_size}/{state.st_mtime_ns}/"))
         for path in files[:: max(1, len(files) // _SAMPLED_FILES)]:

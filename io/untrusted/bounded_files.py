@@ -3,26 +3,27 @@
 XML is read without document types, so that no entity can be declared and expanded.
 """
 
+import errno
 import json
 import os
 import stat
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from stseg.errors import FormatError
+from stseg.errors import FormatError, InputError
 from stseg.io.untrusted import limits
 
 
 def read_bytes(path: Path, most: int = limits.TEXT_FILE) -> bytes:
     """The bytes of a regular file.
 
-    OSError where it cannot be read; ValueError where it is no regular file, or longer than `most`; the message is one
-    line.
+    OSError where it cannot be read or is no regular file; ValueError, of one line, where it is longer than `most`.
     """
     with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
         state = os.fstat(file.fileno())
-        if not stat.S_ISREG(state.st_mode):
-            raise ValueError("what is no regular file")
+        _require_file(state)
         data = file.read(min(most, max(state.st_size, limits.LINE)) + 1)  # so much memory is taken at once
     if len(data) > most:
         raise ValueError(f"more than {most} bytes")
@@ -30,17 +31,34 @@ def read_bytes(path: Path, most: int = limits.TEXT_FILE) -> bytes:
 
 
 def read_text(path: Path, most: int = limits.TEXT_FILE) -> str:
-    """A text in UTF-8, a byte-order mark left out; raises as `read_bytes` does, and UnicodeDecodeError."""
-    return read_bytes(path, most).decode("utf-8-sig")
+    """A text in UTF-8, a byte-order mark left out; raises as `read_bytes` does, for other bytes as well."""
+    try:
+        return read_bytes(path, most).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"bytes that are no UTF-8 at {error.start}") from error
+
+
+@contextmanager
+def reading(path: Path, expected: str, kind: type[InputError] = FormatError) -> Iterator[None]:
+    """Raise what keeps a file from being read whole as an error of a kind."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(path, "", error.strerror or error, expected) from error
+    except ValueError as error:
+        raise kind(path, "", error, expected) from error
 
 
 def require_regular(path: Path) -> None:
-    """Raise OSError where a path is missing or a folder, and ValueError where it is neither file nor folder."""
-    mode = path.stat().st_mode
-    if stat.S_ISDIR(mode):
-        raise IsADirectoryError(21, "Is a directory")
-    if not stat.S_ISREG(mode):
-        raise ValueError("what is no regular file")
+    """Raise OSError where a path is missing, or no regular file."""
+    _require_file(path.stat())
+
+
+def _require_file(state: os.stat_result) -> None:
+    if stat.S_ISDIR(state.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "Is a directory")
+    if not stat.S_ISREG(state.st_mode):
+        raise OSError(errno.EINVAL, "what is no regular file")
 
 
 def parse_json(text: str | bytes) -> object:

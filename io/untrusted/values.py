@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from reprlib import Repr
+from typing import TypeGuard
 
 import numpy as np
 
@@ -23,31 +24,37 @@ _LONGEST_LIST = 600
 _REPR = Repr()
 _REPR.maxlevel, _REPR.maxlist, _REPR.maxdict = 2, 8, 4
 _REPR.maxstring = _REPR.maxother = _LONGEST_VALUE
-_FORBIDDEN = frozenset("/\\")
-EXPECTED = f"a name of 1 to {limits.NAME} printable characters, without slashes, that a file can have"
-EXPECTED_TITLE = f"a name of 1 to {limits.NAME} printable characters"
+_FORBIDDEN, _FORMULA = frozenset("/\\"), "=+-@"
+EXPECTED_TITLE = f"a name of 1 to {limits.NAME} printable characters, not {' '.join(_FORMULA)} first"
+EXPECTED = f"{EXPECTED_TITLE}, without slashes, that a file can have"
 _LONGEST_NUMBER = 400
 """Characters of a number: the longest that Python itself writes has 326."""
 _NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,5})?\s*", re.ASCII)
 _WHOLE_NUMBER = re.compile(r"\s*[+-]?\d{1,18}\s*", re.ASCII)
 
 
-def is_name(text: object) -> bool:
-    """Whether a text is printable and can be a file's name; control and direction marks are not printable."""
+def is_name(text: object) -> TypeGuard[str]:
+    """Whether a text can be a title and a file's name."""
     return (
-        isinstance(text, str)
-        and 0 < len(text) <= limits.NAME
+        is_title(text)
         and len(text.encode("utf-8", "replace")) <= limits.PATH_PART - len("_instances.toml")
-        and text.isprintable()
-        and text == text.strip()
         and text.strip(".") != ""
         and not _FORBIDDEN & set(text)
     )
 
 
-def is_title(text: object) -> bool:
-    """Whether a text can name a track, a zone or a line: printable, and neither empty nor long."""
-    return isinstance(text, str) and 0 < len(text) <= limits.NAME and text.isprintable() and text == text.strip()
+def is_title(text: object) -> TypeGuard[str]:
+    """Whether a text can name a track, a zone or a line: printable, neither empty nor long, and no formula.
+
+    Control and direction marks are not printable. A spreadsheet runs a cell that begins with = + - or @; a number may.
+    """
+    return (
+        isinstance(text, str)
+        and 0 < len(text) <= limits.NAME
+        and text.isprintable()
+        and text == text.strip()
+        and (text[0] not in _FORMULA or math.isfinite(parse_number(text)))
+    )
 
 
 def is_file_name(text: object) -> bool:

@@ -35,12 +35,10 @@ SCENE = ("--area=0,0,1,1", "--frame-rate=5")
 
 
 @cases(
-    ("planes = 4", f"planes = {'9' * 400}"),
-    ("planes = 4", f"planes = {'9' * 5000}"),
+    *(("planes = 4", f"planes = {'9' * digits}") for digits in (400, 5000)),
     ('path = "boxes.csv"', f'path = "{"x" * 300}"'),
-    ("[grid]", "polygon = [" + "[0.0, 0.0], " * 100_000 + "]\n[grid]"),
-    ("[grid]", ".".join("a" * 200_000) + " = 1\n[grid]"),
-    ("[grid]", "a = " + "[" * 100_000 + "\n[grid]"),
+    ("[grid]", f"polygon = [{'[0.0, 0.0], ' * 100_000}]\n[grid]"),
+    *(("[grid]", f"{text}\n[grid]") for text in (".".join("a" * 200_000) + " = 1", "a = " + "[" * 100_000)),
 )
 def test_rigs_beyond_the_limits_are_refused(tmp_path: Path, refusal: Command, old: str, new: str) -> None:
     refusal("run", write_rig(tmp_path, old, new), "-o", tmp_path / "q.h5")

@@ -287,7 +287,7 @@ class TestCommand:
         assert track(Path("room.toml"), Path("room.h5")) == 0
         assert float(evaluate(walkers(16), read_run("room.h5").trajectory).moda or 0) >= 95
 
-    @cases(("camera,u,v,x,y\n" + "a,1,2,3,4\n" * 20_001, "FormatError", r"p.csv: found more than 20000 points"))
+    @cases(("camera,u,v,x,y\n" + "a,1,2,3,4\n" * 20_001, "FormatError", r"line 20002: found more than 20000 rows"))
     def test_says_what_to_mend(self, text: str, kind: str, complaint: str) -> None:
         Path("p.csv").write_text(text)
         refused(getattr(errors, kind), complaint, run, "p.csv")

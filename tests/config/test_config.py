@@ -110,7 +110,7 @@ def test_a_fault_is_laid_where_the_value_was_given(tmp_path: Path) -> None:
     refused(ConfigError, said, read, path, text, "detection.prior_log_odds=1")
     refused(ConfigError, r"c\.toml: found what is not TOML", read, path, "[detection\n")
     path.write_bytes(b"# \xff")
-    refused(ConfigError, r"c\.toml: found what is not TOML", read_config, path)
+    refused(ConfigError, r"c\.toml: found bytes that are no UTF-8 at 2", read_config, path)
     refused(ConfigError, r"none\.toml: found No such file", read_config, tmp_path / "none.toml")
 
 

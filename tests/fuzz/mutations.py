@@ -144,15 +144,8 @@ def _other_array(root: h5py.File, name: str, random: np.random.Generator) -> Non
     if not isinstance(root[name], h5py.Dataset):
         return
     values, attributes = root[name][...], dict(root[name].attrs)
-    forms: tuple[Any, ...] = (
-        values.astype(float) if values.dtype.kind in "iuf" else b"x",
-        values.reshape(-1),
-        values[:1] if values.ndim else values,
-        7,
-        np.zeros((3, 3, 3, 3, 3)),
-        np.array([b"x" * 500]),
-        "x" * 3000,
-    )
+    floats, first = values.astype(float) if values.dtype.kind in "iuf" else b"x", values[:1] if values.ndim else values
+    forms: tuple[Any, ...] = (floats, first, values.ravel(), 7, np.zeros((3,) * 5), np.array([b"x" * 500]), "x" * 3000)
     del root[name]
     root[name] = forms[random.integers(len(forms))]
     root[name].attrs.update(attributes)
@@ -183,11 +176,4 @@ def _attribute(root: h5py.File, name: str, random: np.random.Generator) -> None:
         owner.attrs[keys[random.integers(len(keys))]] = _ATTRIBUTES[random.integers(len(_ATTRIBUTES))]
 
 
-_OBJECT_MUTATIONS: tuple[Callable[[h5py.File, str, np.random.Generator], None], ...] = (
-    _remove_object,
-    _rename,
-    _other_array,
-    _value,
-    _value,
-    _attribute,
-)
+_OBJECT_MUTATIONS = (_remove_object, _rename, _other_array, _value, _value, _attribute)

@@ -1,8 +1,11 @@
 """What a reader has accepted is within the stated limits, and the same once it is written and read again."""
 
 import csv
+import re
 import tomllib
 from collections.abc import Sequence
+from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +16,7 @@ from stseg.arrays import Boxes, Floats, Rows
 from stseg.config import Config
 from stseg.errors import InputError, StsegError
 from stseg.geometry import Camera
+from stseg.identities.review.corrections import ACTIONS
 from stseg.io.answers import AnswerRow
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.point_files import PointTable
@@ -28,13 +32,17 @@ from stseg.io.untrusted import limits
 
 _LINE = 1000
 """Characters of a refusal: values are shown in part."""
+_WHOLE = re.compile(r"(what|something|bytes|no|nothing|numbers|a broken|an image|JSON of|Unable|\d+ (arrays|lines))\b")
+"""How a refusal of a whole file begins, which names no key."""
 _OTHER_FORMS = ("path", "ground", "vertical", "projection")
 _DEFAULTS: tuple[object, ...] = (False, 0, [])
 
 
 def is_title(text: str) -> bool:
     """Whether a text can be shown as a name; said here anew, so that no check of the program vouches for itself."""
-    return 0 < len(text) <= limits.NAME and text.isprintable() and text == text.strip()
+    is_number = re.fullmatch(r"[-+]\d*\.?\d*(e[-+]?\d+)?", text, re.ASCII | re.IGNORECASE)
+    is_plain = 0 < len(text) <= limits.NAME and text.isprintable() and text == text.strip()
+    return is_plain and bool(is_number or not set("=+-@") & set(text[0]))
 
 
 def is_name(text: str) -> bool:
@@ -43,25 +51,57 @@ def is_name(text: str) -> bool:
 
 
 def require_line(error: StsegError, folder: Path) -> None:
-    """A refusal: one short line that names the file, and what is wrong there in words of the format."""
+    """A refusal: one short line that names the file, the key, and what is wrong there in words of the format."""
     line = str(error).replace(str(folder), "")
     assert line.isprintable() and len(line) <= _LINE, line
     assert isinstance(error, InputError) and error.expected, line
     assert str(folder) in str(error) or folder == Path(), line
     assert "a value of another type or size" not in line, line  # the net below the formats' own checks
+    assert error.key or _WHOLE.match(error.found), line
 
 
-def require_table(path: Path) -> None:
-    """A table that was accepted, read as plainly as can be: no column twice, no row wider than the header."""
-    header, *rows = csv.reader(path.read_text("utf-8-sig").splitlines(), skipinitialspace=True)
-    if header[0][:1] in "-.0123456789":  # lines of MOTChallenge
-        assert all(float(row[0].split()[0]).is_integer() for row in rows if any(map(str.strip, row)))
-        return
+def require_place(error: StsegError, valid: bytes, data: bytes) -> None:
+    """Where one row of a valid table was changed, a refusal names its line, or the frame in it."""
+    before, after = valid.splitlines(), data.splitlines()
+    changed = [number for number, (line, one) in enumerate(zip(before, after, strict=False), 1) if line != one]
+    if isinstance(error, InputError) and error.key and len(before) == len(after) and len(changed) == 1 < changed[0]:
+        frame = error.key.startswith("frame ") and error.key.encode()[6:] in after[changed[0] - 1]
+        assert frame or re.search(rf"line {changed[0]}\b", str(error)) or "in the same" in str(error), (error, changed)
+
+
+def rows_of(path: Path) -> list[list[str]]:
+    """Rows of CSV that are not blank."""
+    rows = csv.reader(StringIO(path.read_text("utf-8-sig"), newline=""), skipinitialspace=True)
+    return [row for row in rows if any(map(str.strip, row))]
+
+
+def require_json(value: Any, size: tuple[int, int]) -> None:
+    """Objects of JSON: images of a size, numbers of frames within limits, keyframes that rise."""
+    for one in value if isinstance(value, list) else []:
+        require_json(one, size)
+    if isinstance(value, dict):
+        sides = (value.get("width"), value.get("height")) if "file_name" in value else size
+        assert sides == size or not all(isinstance(side, int) and side > 0 for side in sides), sides
+        keys = [step["frame"] for step in value.get("sequence", []) if "frame" in step]
+        assert all(first < later for first, later in pairwise(keys)), keys
+        assert all(abs(float(value.get(name, 0))) <= limits.FRAMES for name in ("framesCount", "image_id")), value
+        require_json(list(value.values()), size)
+
+
+def require_table(path: Path, least: float) -> None:
+    """A table that was accepted: no column twice, no row wider than the header, whole frames from `least` on."""
+    header, *rows = rows_of(path)
     names = [name.strip().lower() for name in header]
-    assert all(names.count(name) < 2 for name in names if name), names
-    assert not any(cell.strip() for row in rows for cell in row[len(names) :]), rows
-    if "frame" in names:
-        assert all(float(row[names.index("frame")] or 0).is_integer() for row in rows if any(map(str.strip, row))), rows
+    if header[0][:1] in "-.0123456789":  # lines of MOTChallenge
+        rows, names = [re.split("[ ,]+", ",".join(row).strip()) for row in [header, *rows]], ["frame", "id"]
+        if len(rows[0]) == 9:  # the truth of MOTChallenge
+            return
+        assert float(rows[0][1]).is_integer()
+    else:
+        assert all(names.count(name) < 2 for name in names if name), names
+        assert not any(cell.strip() for row in rows for cell in row[len(names) :]), rows
+    frames = [float(row[names.index("frame")] or 0) for row in rows if "frame" in names]
+    assert all(frame.is_integer() and least <= frame <= limits.FRAMES for frame in frames), frames
 
 
 def require_kept(given: Any, written: Any) -> None:
@@ -127,6 +167,9 @@ def require_cameras(cameras: Sequence[ForeignCamera], path: Path) -> None:
         assert any(np.array_equal(array, cameras[0].projection) for array in arrays)
     for camera in cameras:
         require_numbers(limits.NUMBER, camera.projection)
+        if camera.lens is not None:
+            turn = np.linalg.solve(camera.lens.matrix, camera.projection[:, :3])
+            assert np.abs(turn @ turn.T - np.eye(3)).max() < 0.02 and np.linalg.det(turn) > 0, turn
         assert not camera.name or is_name(camera.name)
         assert path.suffix != ".xml" or np.linalg.det(camera.projection[:, :3]) > 0  # no mirror
         assert camera.size is None or 0 < min(camera.size) <= max(camera.size) <= limits.SIDE
@@ -149,7 +192,7 @@ def require_areas(areas: Sequence[tuple[str, tuple[Floats, ...]]]) -> None:
 def require_answers(rows: Sequence[AnswerRow]) -> None:
     """Answers about tracks."""
     for row in rows:
-        assert not row.name or is_title(row.name)
+        assert (not row.name or is_title(row.name)) and row.action in ACTIONS, row
         assert all(0 <= number <= limits.FRAMES for number in (row.track, row.other, row.frame or 0))
 
 

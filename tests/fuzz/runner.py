@@ -80,13 +80,14 @@ def _work(target: Target, first: int, until: float, stop: int, shared: mmap.mmap
     try:
         with tempfile.TemporaryDirectory() as name:
             valid = target.valid(Path(name))
-            _one(target, Path(name) / f"valid{target.suffix}", valid, is_valid=True)
+            _one(target, Path(name) / f"valid{target.suffix}", valid)
             for seed in range(first, stop):
                 shared[:16] = struct.pack("<qd", seed, time.monotonic())
                 if time.monotonic() > until:
                     return 0
+                os.environ["PYTEST_CURRENT_TEST"] = f"{target.name} {seed}"  # `tools/mutants.py` notes it
                 signal.setitimer(signal.ITIMER_PROF, SECONDS)
-                _one(target, Path(name) / f"fuzzed{target.suffix}", content(target, valid, seed))
+                _one(target, Path(name) / f"fuzzed{target.suffix}", content(target, valid, seed), valid)
             shared[:8] = struct.pack("<q", stop)
     except BaseException as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
@@ -96,12 +97,15 @@ def _work(target: Target, first: int, until: float, stop: int, shared: mmap.mmap
     return 0
 
 
-def _one(target: Target, path: Path, data: bytes, *, is_valid: bool = False) -> None:
+def _one(target: Target, path: Path, data: bytes, valid: bytes | None = None) -> None:
     path.write_bytes(data)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = answer(target, path)
-    assert not (is_valid and found), found
+        found = answer(target, path, valid or data)
+    if answers := os.environ.get("FUZZ_ANSWERS"):
+        with Path(answers).open("a") as file:
+            print(os.environ.get("PYTEST_CURRENT_TEST"), bool(found), file=file)
+    assert valid is not None or not found, found
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     if held > MEBI:
         raise AssertionError(f"{held} MiB of memory")

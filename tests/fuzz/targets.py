@@ -75,14 +75,16 @@ class Target:
         return text(self.name) if self.make is None else self.make(folder)
 
 
-def answer(target: Target, path: Path) -> str:
+def answer(target: Target, path: Path, valid: bytes = b"") -> str:
     """The answer to a file: nothing, or one line; anything else than StsegError is raised."""
     try:
         target.read(path)
         if (target.suffix == ".csv" and not target.name.startswith("live")) or target.name == "mot.txt":
-            oracles.require_table(path)
+            oracles.require_table(path, -limits.FRAMES if target.name == "tracks.csv" else 0)
     except StsegError as error:
         oracles.require_line(error, Path() if target.read is _points else path.parent)  # arrays have no file
+        if (target.suffix == ".csv" and target.read is not _points) or target.name.startswith("mot"):
+            oracles.require_place(error, valid, path.read_bytes())
         return str(error)
     return ""
 
@@ -91,8 +93,7 @@ SIZE = (64, 48)
 CAMERA = Camera("cam1", SIZE, np.eye(3), np.array([0.0, 0.0, -1.0]))
 OPTIONS = ImportOptions(SIZE, "m", 1.75)
 _GROUND = np.array([[0.1, 0.1], [0.3, 0.2], [5.0, 5.0]])
-_FRAMES = 20
-_NOTES = {"config": {"a": 1}, "rig": {"b": "c"}}
+_FRAMES, _NOTES = 20, {"config": {"a": 1}, "rig": {"b": "c"}}
 
 
 def _frames_of(source: Source, most: float = limits.NUMBER) -> None:
@@ -100,6 +101,8 @@ def _frames_of(source: Source, most: float = limits.NUMBER) -> None:
     stream = open_stream(source, CAMERA)
     views = list(takewhile(lambda view: view is not None, (stream.read() for _ in range(_FRAMES))))
     stream.close()
+    if source.path.suffix == ".json":
+        oracles.require_json(json.loads(source.path.read_text("utf-8-sig")), CAMERA.size)
     oracles.require_boxes([view for view in views if isinstance(view, Boxes)], CAMERA, source.path.parent, most)
 
 
@@ -196,10 +199,8 @@ def _live_table(path: Path) -> None:
 
 def _zones(path: Path) -> None:
     oracles.require_areas(zones := read_polygons(path))
-    for name, rings in zones:
-        zone = Zone(name, rings)
-        zone.contains(_GROUND)
-        assert np.isfinite(zone.area)
+    for zone in (Zone(name, rings) for name, rings in zones):
+        assert zone.contains(_GROUND).shape == (len(_GROUND),) and np.isfinite(zone.area)
 
 
 def _lines(path: Path) -> None:
@@ -215,8 +216,9 @@ def _answers(path: Path) -> None:
 
 
 def _names(path: Path) -> None:
-    small = path.with_name("small.h5")
-    run = read_run(small if small.exists() else write_small_run(small)).with_names(read_names(path))
+    small, names = path.with_name("small.h5"), read_names(path)
+    assert len(names) == len(oracles.rows_of(path)) - 1
+    run = read_run(small if small.exists() else write_small_run(small)).with_names(names)
     with replacing(path.with_name("out"), overwrite=True) as part:
         exports.write_tracks("geojson", part, run)
 

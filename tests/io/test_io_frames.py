@@ -66,16 +66,12 @@ def shown(rec: Recording, first: int = 0, stop: int | None = None) -> list[tuple
         return [(frame_set.frame, *map(number, frame_set.views)) for frame_set in reader]
 
 
-@pytest.mark.parametrize(
-    ("kind", "shape", "dtype"),
-    [
-        ("video", (12, 16, 3), np.uint8),
-        ("masks", (12, 16), np.uint8),
-        ("images", (12, 16, 3), np.uint8),
-        ("instances", (12, 16), np.uint16),
-    ],
-)
-def test_kinds_give_arrays(tmp_path: Path, kind: SourceKind, shape: tuple[int, ...], dtype: type[np.generic]) -> None:
+SHOWN = [("video", (3,), np.uint8), ("masks", (), np.uint8), ("images", (3,), np.uint8), ("instances", (), np.uint16)]
+
+
+@pytest.mark.parametrize(("kind", "colours", "dtype"), SHOWN)
+def test_kinds_give_arrays(tmp_path: Path, kind: SourceKind, colours: tuple[int, ...], dtype: type[np.generic]) -> None:
+    shape = (12, 16, *colours)
     path = video(tmp_path / "a.avi", 3) if kind == "video" else images(tmp_path / "a", 3)
     rec = blank_recording(CameraSource(Source(kind, path)))
     with open_frames(rec) as reader:

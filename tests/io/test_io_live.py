@@ -140,14 +140,9 @@ def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
     assert reported == ["waiting for the next file of east, at frame 0"]
 
 
-@pytest.mark.parametrize(
-    "source",
-    [
-        Source("video", Path("cam.avi")),
-        Source("images", Path("*.png")),
-        Source("video", Path("a*"), more=(Path("b*"),)),
-    ],
-)
+@pytest.mark.parametrize("source", [
+    Source("video", Path("cam.avi")), Source("images", Path("*.png")), Source("video", Path("a*"), more=(Path("b*"),)),
+])  # fmt: skip
 def test_what_cannot_be_followed_is_refused(arriving: Path, source: Source) -> None:
     recording = read_recording(arriving)
     assert not is_live(recording) and is_live(live())

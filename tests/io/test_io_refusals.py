@@ -155,14 +155,11 @@ def test_objects_are_refused(run_path: Path, name: str, value: Any, part: str, m
     assert said.isprintable() and len(said) < 600 + len(str(run_path))
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "message"),
-    [
-        ("/boxes", None, "/boxes: found a table of fixed size"),
-        ("/entry/occupancy/label", -1, "label: found labels that are no ids"),
-        ("/answers", np.array([(1, 0, 0)], ANSWER), "/answers: found a row after its other"),
-    ],
-)
+@pytest.mark.parametrize(("name", "value", "message"), [
+    ("/boxes", None, "/boxes: found a table of fixed size"),
+    ("/entry/occupancy/label", -1, "label: found labels that are no ids"),
+    ("/answers", np.array([(1, 0, 0)], ANSWER), "/answers: found a row after its other"),
+])  # fmt: skip
 def test_runs_that_cannot_be_corrected_are_refused(run_path: Path, name: str, value: Any, message: str) -> None:
     with h5py.File(run_path, "r+") as file:
         put(file, "/committed", file["trajectory"][[0, -1]])
@@ -189,14 +186,11 @@ def test_titles_print_without_escape_codes(run_path: Path) -> None:
     assert (run.scene, run.provenance.created) == (r"\x1b[31m", r"\x1b[31m")
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda file: file.create_group("a/b/c/d/e/f/g/h/i/j"), "i/j: more than 10000 objects, or groups nested too"),
-        (lambda file: file.create_dataset("x", (9,), "u1", compression="lzf"), r"/x: packed with filters \[32000\]"),
-        (lambda file: file.create_dataset("x", (1 << 30,), "u1", chunks=(1 << 30,)), "/x: chunks of 1073741824 bytes"),
-    ],
-)
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda file: file.create_group("a/b/c/d/e/f/g/h/i/j"), "i/j: more than 10000 objects, or groups nested too"),
+    (lambda file: file.create_dataset("x", (9,), "u1", compression="lzf"), r"/x: packed with filters \[32000\]"),
+    (lambda file: file.create_dataset("x", (1 << 30,), "u1", chunks=(1 << 30,)), "/x: chunks of 1073741824 bytes"),
+])  # fmt: skip
 def test_structures_of_hdf5_are_refused(run_path: Path, make: Callable[[h5py.File], object], message: str) -> None:
     with h5py.File(run_path, "r+") as file:
         make(file)
@@ -210,23 +204,15 @@ def test_short_addresses_of_hdf5_are_refused(tmp_path: Path) -> None:
     refused(FormatError, r"addresses and lengths of \(4, 4\) bytes", read_run, tmp_path / "a.h5")
 
 
-NOW, COUNT = np.arange(4.0), np.array([4])
+NOW, COUNT, ONE = np.arange(4.0), np.array([4]), np.ones(1, int)
 
 
-@pytest.mark.parametrize(
-    "stored",
-    [
-        {"times0_0": NOW},
-        {"files": COUNT[:0], "times0_0": NOW},
-        {"files": np.ones(1), "times0_0": NOW},
-        {"files": np.ones(257, int), "times0_0": NOW},
-        {"files": np.ones(1, int)},
-        {"files": np.ones(1, int), "times0_0": NOW.astype("f4")},
-        {"files": np.ones(1, int), "times0_0": NOW[:, None]},
-        {"files": np.ones(1, int), "times0_0": np.array([-1])},
-        {"files": np.ones(1, int), "times0_0": np.array([limits.FRAMES + 1])},
-    ],
-)
+@pytest.mark.parametrize("stored", [
+    {"times0_0": NOW},
+    *({"files": files, "times0_0": NOW} for files in (COUNT[:0], np.ones(1), np.ones(257, int))),
+    {"files": ONE},
+    *({"files": ONE, "times0_0": t} for t in (NOW.astype("f4"), NOW[:, None], -ONE, ONE + limits.FRAMES)),
+])  # fmt: skip
 def test_stored_time_stamps_are_refused(tmp_path: Path, stored: dict[str, np.ndarray]) -> None:
     recording = read_recording(write_rig(tmp_path))
     np.savez(tmp_path / "streams.npz", files=np.ones(1, int), times0_0=COUNT)
@@ -244,16 +230,13 @@ def test_archives_of_many_members_or_axes_are_refused(tmp_path: Path, monkeypatc
     refused(ValueError, "2 members, more than 1", read_npz, tmp_path / "a.npz")
 
 
-@pytest.mark.parametrize(
-    ("question", "wrong"),
-    [
-        (is_name, [5, "€" * 90, "x" * 101, " a", "..", "a/b", "\x1b"]),
-        (is_title, [5, "", "x" * 101, " a", "\x1b"]),
-        (is_file_name, [5, "", ".", "..", "a/b", "a\0b", "x" * 256, "x" * 5000]),
-    ],
-)
+@pytest.mark.parametrize(("question", "wrong"), [
+    (is_name, [5, "€" * 90, "x" * 101, " a", "..", "a/b", "\x1b", "@a"]),
+    (is_title, [5, "", "x" * 101, " a", "\x1b", "=1+1", "-2+3", "+a"]),
+    (is_file_name, [5, "", ".", "..", "a/b", "a\0b", "x" * 256, "x" * 5000]),
+])  # fmt: skip
 def test_names_of_three_kinds(question: Callable[[object], bool], wrong: list[object]) -> None:
-    assert not any(map(question, wrong)) and question("a b")
+    assert not any(map(question, wrong)) and question("a b") and question("-1")
 
 
 _BEGIN, _SEVEN = "GCOL\1\0\0\0", "\0" * 7
@@ -267,13 +250,13 @@ CROWD = "frame,id,x,y\n" + "".join(f"0,{k},0,0\n" for k in range(20_000))
     [
         (ValueError, lambda _: parse_toml("#" * (limits.TEXT_FILE + 1)), "characters, more than"),
         (FormatError, lambda at: read_tracks_csv(text(at / "t.csv", "frame,id,x,y\n3e7,1,0,0")), "a frame up to 2"),
-        (FormatError, lambda at: read_tracks_csv(text(at / "t.csv", CROWD)), "20000 rows of frame 0, expected at most"),
+        (FormatError, lambda at: read_tracks_csv(text(at / "t.csv", CROWD)), "frame 0: found 20000 rows, expected"),
         (SourceError, lambda at: read_video_size(at), "no regular file, expected a video"),
         (SourceError, lambda at: read_video_size(text(at / "a.avi", "")), "no frame that decodes"),
         (SourceError, lambda at: read_video_size(text(at / "a.avi", "\ufeff#EXTM3U")), "a text, such as a playlist"),
         (SourceError, lambda at: read_video_size(text(at / "a.avi", "ffconcat version 1.0\nfile a.avi")), "playlist"),
         (OSError, lambda at: read_bytes(at), "Is a directory"),
-        (ValueError, lambda at: read_bytes(pipe(at / "a")), "what is no regular file"),
+        (OSError, lambda at: read_bytes(pipe(at / "a")), "what is no regular file"),
         (ValueError, lambda at: read_bytes(text(at / "a", "abc"), 2), "more than 2 bytes"),
         (ValueError, lambda at: require_sound_heaps(text(at / "a", HEAPS)), "a global heap at byte 32 inside of anoth"),
         (ValueError, lambda at: read_whole(unwritten(at / "a")), "80000 bytes declared, 0 stored"),

@@ -14,7 +14,7 @@ from stseg.io.recording.recording import Recording
 from stseg.io.recording.source_files import source_parts
 from stseg.io.recording.video.time_stamps import pack_stamps, unpack_stamps
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import is_regular
+from stseg.io.untrusted.bounded_files import is_regular, require_regular
 from stseg.io.untrusted.numpy_files import read_npz
 
 _SEGMENT = re.compile(r"segment-(\d{5})-([0-9a-f]{32})\.h5")
@@ -53,6 +53,7 @@ def keep_segment(draft: Path) -> Path:
 
 def checksum(path: Path) -> str:
     """Checksum of a file, 32 hexadecimal digits."""
+    require_regular(path)
     with path.open("rb") as file:
         return file_digest(file, lambda: blake2b(digest_size=16)).hexdigest()
 

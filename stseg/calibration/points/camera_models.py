@@ -131,7 +131,7 @@ class ModelFit:
         return fit_model(self.model, self.unknowns, points, used, robust=False)
 
 
-@np.errstate(over="ignore")  # of steps that are not taken
+@np.errstate(over="ignore", invalid="ignore")  # of steps that are not taken
 def fit_model(model: Model, start: Floats, points: Points, used: Flags, robust: bool = True) -> ModelFit:
     """Least squares over the points in use; with `robust`, a Cauchy loss finds the outliers among them first."""
 
