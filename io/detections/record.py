@@ -20,7 +20,7 @@ from stseg.errors import FormatError, SourceError, printable
 from stseg.io.detections.masks import Mask
 from stseg.io.recording.recording import Source
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.bounded_files import parse_json, read_text
+from stseg.io.untrusted.bounded_files import parse_json, read_text, reading
 from stseg.io.untrusted.values import abbreviated, finite_number, parse_number
 
 LEAST_NUMBERS = ("frame", "left", "top", "width", "height", "score")
@@ -156,12 +156,8 @@ def read_json(path: Path) -> Any:
 
     SourceError, FormatError where the file cannot be read, or is no JSON: names the line.
     """
-    try:
+    with reading(path, "a file of detections", SourceError):
         text = read_text(path, limits.DETECTIONS_FILE)
-    except OSError as error:
-        raise SourceError(path, "", error.strerror or error, "a file of detections") from error
-    except ValueError as error:
-        raise FormatError(path, "", error, "a file of detections") from error
     try:
         return parse_json(text)
     except ValueError as whole:

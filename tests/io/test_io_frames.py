@@ -23,6 +23,7 @@ from stseg.io.recording.frames import FrameSet, open_frames, read_background, re
 from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
 
 SIZE = (16, 12)
+SHOWN = [("video", (3,), np.uint8), ("masks", (), np.uint8), ("images", (3,), np.uint8), ("instances", (), np.uint16)]
 
 
 def shade(frame: int) -> AnyArray:
@@ -66,18 +67,14 @@ def shown(rec: Recording, first: int = 0, stop: int | None = None) -> list[tuple
         return [(frame_set.frame, *map(number, frame_set.views)) for frame_set in reader]
 
 
-SHOWN = [("video", (3,), np.uint8), ("masks", (), np.uint8), ("images", (3,), np.uint8), ("instances", (), np.uint16)]
-
-
 @pytest.mark.parametrize(("kind", "colours", "dtype"), SHOWN)
 def test_kinds_give_arrays(tmp_path: Path, kind: SourceKind, colours: tuple[int, ...], dtype: type[np.generic]) -> None:
-    shape = (12, 16, *colours)
     path = video(tmp_path / "a.avi", 3) if kind == "video" else images(tmp_path / "a", 3)
     rec = blank_recording(CameraSource(Source(kind, path)))
     with open_frames(rec) as reader:
         for frame_set in reader:
             (view,) = map(np.asarray, frame_set.views)
-            assert view.shape == shape and view.dtype == dtype
+            assert view.shape == (12, 16, *colours) and view.dtype == dtype
             assert (view == 10 * frame_set.frame).all()
     assert frame_set.frame == 2
     assert index_streams(rec).length == 3
