@@ -101,6 +101,7 @@ def _frames_of(source: Source, most: float = limits.NUMBER) -> None:
     stream = open_stream(source, CAMERA)
     views = list(takewhile(lambda view: view is not None, (stream.read() for _ in range(_FRAMES))))
     stream.close()
+    assert views, "a source that shows nothing"
     if source.path.suffix == ".json":
         oracles.require_json(json.loads(source.path.read_text("utf-8-sig")), CAMERA.size)
     oracles.require_boxes([view for view in views if isinstance(view, Boxes)], CAMERA, source.path.parent, most)

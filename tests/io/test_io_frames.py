@@ -76,8 +76,7 @@ def test_kinds_give_arrays(tmp_path: Path, kind: SourceKind, colours: tuple[int,
             (view,) = map(np.asarray, frame_set.views)
             assert view.shape == (12, 16, *colours) and view.dtype == dtype
             assert (view == 10 * frame_set.frame).all()
-    assert frame_set.frame == 2
-    assert index_streams(rec).length == 3
+    assert (frame_set.frame, index_streams(rec).length) == (2, 3)
 
 
 def test_all_kinds_together(tmp_path: Path) -> None:
