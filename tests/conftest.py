@@ -7,11 +7,10 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in commands: its threads wait for work by spinning
 
 import pytest
+from checks import REFUSAL_TIME, Command, examples
 from hypothesis import HealthCheck, settings
 from recordings import track, write_recording
-from refusals import REFUSAL_TIME, Command
 from run_files import write_small_run
-from strategies import examples
 
 from stseg.commands.main import main
 

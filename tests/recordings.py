@@ -7,15 +7,12 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import pytest
 from scenes import box_frame_sets, looking, rig_of, walkers
 
-from stseg.arrays import Boxes
+from stseg import Boxes, Camera, Grid, Recording, Rig, Source
 from stseg.commands.main import main
-from stseg.geometry import Camera, Grid, Rig
-from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.recording import CameraSource
 from stseg.io.recording.rig_text import format_rig
-from stseg.kernels.accelerate import COMPILED
 
 FRAMES = 28
 PLACES = {"west": (-3.5, -3.5, 2.6), "east": (3.5, -3.4, 2.6), "north": (0.0, 3.6, 2.6)}
@@ -23,7 +20,6 @@ OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set",
 """Segments of six frames."""
 ALONE = ("--workers", "1")
 """In this process alone."""
-compiled_only = pytest.mark.skipif(not COMPILED, reason="too slow without a compiler")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 COMMAND = """
 import signal, sys
@@ -47,19 +43,6 @@ def process(
     with started(program, *arguments, cwd=cwd, **environment) as running:
         printed = running.communicate()
         return subprocess.CompletedProcess(running.args, running.returncode, *printed)
-
-
-def data_path(name: str) -> Path:
-    """A data set, or a file of one; the test is skipped where it is not here."""
-    path = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data")) / name
-    if not path.exists():
-        pytest.skip(f"{name} is not here: set STSEG_DATA to the folder of the data sets")
-    return path
-
-
-def in_ci(*cases: object) -> list[object]:
-    """Cases of a parametrised test that CI runs, and plain pytest does not: others show the same in less time."""
-    return [pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.slow) for case in cases]
 
 
 def blank_recording(*sources: CameraSource, size: tuple[int, int] = (16, 12), rate: float = 5.0) -> Recording:

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from reference_core import best_pairs
 
-from stseg.arrays import Boxes, Bytes, Floats, Rows, Singles, ViewEvidence
+from stseg import Boxes, Camera, Config, FrameSet, Grid, Lens, Rig
+from stseg.arrays import Bytes, Floats, Rows, Singles, ViewEvidence
 from stseg.bodies.pillars import PROFILE, SILHOUETTE
-from stseg.config import BodyConfig, Config, DetectionConfig
+from stseg.config import BodyConfig, DetectionConfig
 from stseg.detection.detector import Detector
-from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.io.recording.frames import FrameSet
 from stseg.records.people import People
 from stseg.records.predicted_tracks import PredictedTracks, no_tracks
 from stseg.records.sizes import Sizes

@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from checks import numbers
 from hypothesis import strategies as st
 from scenes import looking
-from strategies import numbers
 
+from stseg import Camera, Config, Grid, Rig
 from stseg.arrays import Floats, Rows
 from stseg.calibration.automatic.endpoints import Endpoints
 from stseg.calibration.automatic.solution import CalibrationInput
-from stseg.config import Config
-from stseg.geometry import Camera, Grid, Rig
 from stseg.records.border import Border
 from stseg.records.tables import TRAJECTORY
 from stseg.simulation import SceneSpec

@@ -1,13 +1,10 @@
 """Hypothesis strategies for geometry: cameras that watch an area, grids, rigs, recordings."""
 
-import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from hypothesis import given, settings
+from checks import numbers
 from hypothesis import strategies as st
 from scenes import rotation_towards
 
@@ -16,7 +13,6 @@ from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.lens import LensModel
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, Recording, Source
 from stseg.io.untrusted.values import is_name
-from stseg.kernels.accelerate import COMPILED
 
 BARREL = (-0.39, 0.25, 0.0008, -0.0017, -0.107)
 """A strong barrel, whose polynomial turns round about 48 degrees off the axis."""
@@ -32,22 +28,6 @@ LENSES: tuple[tuple[tuple[float, ...], LensModel], ...] = (
 """Coefficients and models of lenses of all kinds."""
 
 
-def examples(number: int) -> int:
-    """Number of examples of a property: a third, all with STSEG_ALL_EXAMPLES, a fifth with kernels as plain Python."""
-    return -(-number // (5 if not COMPILED else 1 if "STSEG_ALL_EXAMPLES" in os.environ else 3))
-
-
-def drawn(
-    number: int, *strategies: st.SearchStrategy[Any], **named: st.SearchStrategy[Any]
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """A property of drawn values, as many as examples() makes of a number."""
-
-    def tested(test: Callable[..., None]) -> Callable[..., None]:
-        return settings(max_examples=examples(number))(given(*strategies, **named)(test))
-
-    return tested
-
-
 @dataclass(frozen=True)
 class Pose:
     """A calibrated camera: x = K (R X + t), metres, Z up."""
@@ -60,11 +40,6 @@ class Pose:
     def projection(self) -> Floats:
         """K [R | t], float64 (3, 4)."""
         return np.asarray(self.matrix @ np.column_stack([self.rotation, self.translation]))
-
-
-def numbers(low: float, high: float) -> st.SearchStrategy[float]:
-    """Finite floats, bounds included."""
-    return st.floats(low, high, allow_nan=False, allow_infinity=False)
 
 
 @st.composite

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attacks import RIG, write_rig
-from recordings import COMMAND, in_ci, process
-from refusals import REFUSAL_TIME, Command, refused
+from checks import REFUSAL_TIME, Command, in_ci, refused
+from recordings import COMMAND, process
 
 from stseg.commands.main import main
 from stseg.errors import FormatError

@@ -13,19 +13,17 @@ import cv2
 import numpy as np
 import pytest
 from attacks import film, write_rig
-from cases import cases
+from checks import Command, cases, refused
 from fuzz.corpus import mat_file
-from refusals import Command, refused
 
+from stseg import Config, read_recording
 from stseg.commands.main import main
-from stseg.config import Config
 from stseg.engine.offline.job import Job
 from stseg.errors import SourceError
 from stseg.io.calibrations.matlab_file import parse_mat
 from stseg.io.live.live_stream import FFmpegCapture
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.pictures import read_picture
-from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.source_files import source_parts
 from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.io.recording.video.packets import PictureHeads

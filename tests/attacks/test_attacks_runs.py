@@ -9,9 +9,8 @@ from pathlib import Path
 import h5py
 import pytest
 from attacks import RIG, write_rig
-from cases import cases
-from recordings import COMMAND, ENVIRONMENT, in_ci
-from refusals import Command, refused
+from checks import Command, cases, in_ci, refused
+from recordings import COMMAND, ENVIRONMENT
 from run_files import write_small_run
 
 from stseg.errors import FormatError

@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from checks import compiled_only
 from fault_driver import Driver
-from recordings import assert_same, compiled_only, write_recording
+from recordings import assert_same, write_recording
 
 pytestmark = [pytest.mark.skipif(sys.platform != "linux", reason="needs /proc"), compiled_only]
 

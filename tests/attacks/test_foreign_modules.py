@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 from arrivals import arrive, write_pieces
-from cases import tables
+from checks import compiled_only, tables
 from cluster import started_cluster
-from recordings import ENVIRONMENT, OPTIONS, compiled_only
+from recordings import ENVIRONMENT, OPTIONS
 
 LIBRARIES = ("numpy", "scipy", "h5py", "cv2", "numba", "cyclopts", "rich", "PIL", "maxflow", "yaml", "duckdb", "stseg")
 SCRIPT = "from stseg.commands.main import command\nif __name__ == '__main__':\n    command()\n"

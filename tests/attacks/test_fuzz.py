@@ -5,11 +5,10 @@ import time
 from pathlib import Path
 
 import pytest
+from checks import drawn, in_ci
 from fuzz.runner import fuzz
 from fuzz.targets import TARGETS, Target
 from hypothesis import strategies as st
-from recordings import in_ci
-from strategies import drawn
 
 from stseg.errors import printable
 from stseg.io.toml import parse_toml

@@ -9,8 +9,7 @@ from unittest.mock import Mock
 import cv2
 import numpy as np
 import pytest
-from cases import tables
-from refusals import Command
+from checks import Command, tables
 from run_files import write_small_run
 
 from stseg.commands.main import main

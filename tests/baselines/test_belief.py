@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_belief as plain
+from checks import compiled_only, drawn
 from coloured_people import FLOOR, RIG, follow, frame_of, observations_of, painted, rows_of
 from hypothesis import strategies as st
 from scenes import CONFIG, FRAME_RATE, SIZE, people
 from scipy.stats import multivariate_normal
-from strategies import cameras, drawn
+from strategies import cameras
 
 from stseg.arrays import Bytes, Floats, Observation
 from stseg.baselines.du_piater_2006.exclusion import exclusion
@@ -230,6 +231,7 @@ QUICK = replace(CONFIG, belief=FEW)
 PASSING = ((-0.9, -0.3, 0.1, 0.0), (0.9, 0.3, -0.1, 0.0))
 
 
+@compiled_only
 def test_two_who_pass_each_other_keep_their_numbers() -> None:
     frames = 18 if COMPILED else 8
     rows = rows_of(follow(BeliefTracker(RIG, QUICK, 0), frames, PASSING))
@@ -240,6 +242,7 @@ def test_two_who_pass_each_other_keep_their_numbers() -> None:
         assert away.max() < 0.25 and np.median(away) < 0.12
 
 
+@compiled_only
 def test_the_colours_lead_where_nobody_is_found() -> None:
     """The pass finds a person in three frames and then no more: they are followed, and then ended with a reason."""
     tracker = BeliefTracker(RIG, replace(CONFIG, belief=replace(FEW, patience=0.5)), 0)
@@ -263,6 +266,7 @@ def test_the_order_of_targets_does_not_matter() -> None:
         np.testing.assert_array_equal(one.ground.place, other.ground.place)
 
 
+@compiled_only
 def test_a_tracker_goes_on_after_it_was_put_aside() -> None:
     tracker = BeliefTracker(RIG, QUICK, 0)
     assert follow(tracker, 3, PASSING)
@@ -282,6 +286,7 @@ def test_whom_it_expects() -> None:
     assert expected.existence[0] == 1.0
 
 
+@compiled_only
 def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
     """The ablation: a view whose picture is blank takes its fused place along; messages do not."""
     away = {}

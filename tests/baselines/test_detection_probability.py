@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_detection_probability as reference
+from checks import compiled_only, drawn, numbers, refused
 from hypothesis import assume, example
 from hypothesis import strategies as st
-from refusals import refused
 from scenes import corner_cameras, likelihoods, looking, people, rig_of
-from strategies import BARREL, cameras, drawn, numbers
+from strategies import BARREL, cameras
 
 from stseg.arrays import Floats, Singles
 from stseg.baselines.huang_wang_2012.detection_probability import DetectionProbability, fill_chance
@@ -101,6 +101,7 @@ VIEWS = {
 """Cameras, and how much of strips and pillar together both must cover."""
 
 
+@compiled_only
 @pytest.mark.parametrize("view", VIEWS)
 def test_strips_cover_what_the_pillar_does(view: str) -> None:
     # Images are enlarged so that whole pixels are no part of the error, but where there is a lens.
@@ -239,6 +240,7 @@ def test_modes_share_all_samples_out(weight: Floats, kernel: float) -> None:
     assert (np.linalg.eigvalsh(found.covariance) > 0.25**2 / 12 - 1e-9).all()
 
 
+@compiled_only
 def test_two_people_apart_are_two_modes_of_their_own_shape() -> None:
     axis = np.arange(-2, 2, 0.1)
     ground = np.stack(np.meshgrid(axis, axis), -1)

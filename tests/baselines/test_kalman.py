@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import drawn
 from hypothesis import strategies as st
 from scenes import CONFIG, FRAME_RATE, found, people, room
-from strategies import drawn
 
 from stseg.arrays import Floats, Rows
 from stseg.baselines.huang_wang_2012.kalman import KalmanTracker

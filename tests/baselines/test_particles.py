@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_particles as plain
+from checks import compiled_only, drawn
 from coloured_people import RIG, SHIRTS, follow, frame_of, observations_of, painted, rows_of
 from hypothesis import strategies as st
 from scenes import CONFIG, SIZE, corner_cameras, looking, mask, people
-from strategies import drawn
 
 from stseg.arrays import Floats, Rows, Singles
 from stseg.baselines.colour_views import colour_views
@@ -224,6 +224,7 @@ QUICK = replace(CONFIG, particles=ParticleConfig(particles=6, raster_columns=64,
 FRAMES = 16 if COMPILED else 6
 
 
+@compiled_only
 def test_people_are_followed_by_their_colours() -> None:
     rows = passing(QUICK, FRAMES)
     assert np.unique(rows["id"]).tolist() == [1, 2] and len(rows) == 2 * FRAMES
@@ -257,6 +258,7 @@ def test_the_search_goes_to_the_person_from_beside() -> None:
     assert right[0] < wrong[0]
 
 
+@compiled_only
 def test_who_is_not_found_or_leaves_is_followed_no_longer() -> None:
     config = replace(QUICK, particles=replace(QUICK.particles, patience=0.5))
     tracker = ParticleTracker(RIG, config, 0)

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import pytest
 import scenes
-from recordings import in_ci
+from checks import in_ci
 
 from stseg.arrays import ViewEvidence
 from stseg.baselines.huang_wang_2012.proposals import Fuse, Proposals, empty_explanation, marginal

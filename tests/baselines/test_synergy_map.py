@@ -4,11 +4,10 @@ import cv2
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import compiled_only, drawn, refused
 from hypothesis import strategies as st
-from refusals import refused
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, found, likelihoods, looking, people, rig_of
 from scipy.special import logit
-from strategies import drawn
 
 from stseg.arrays import Floats, Singles
 from stseg.baselines.khan_shah_2009.synergy_map import Localiser, fill_means, synergy_terms
@@ -64,6 +63,7 @@ def test_what_is_no_likelihood_becomes_one(value: float) -> None:
     assert np.isfinite(Localiser(COARSE, "footprint").synergy(maps, np.ones(4), 0.05)).all()
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("blind", [None, 1])
 def test_localisation_by_definition(kind: SamplingKind, blind: int | None) -> None:
@@ -188,6 +188,7 @@ def fine_views(views: int) -> Localiser:
     return Localiser(rig_of(cameras, cell=0.04, planes=1), "point")
 
 
+@compiled_only
 @pytest.mark.parametrize("views", [1, 2, 3, 5, 8])
 def test_empty_cells_are_not_occupied_in_many_views(views: int) -> None:
     """With the true rates, at most pi / (1 - pi) of the empty cells come to log-odds above 0 (Markov's inequality)."""
@@ -201,6 +202,7 @@ def test_empty_cells_are_not_occupied_in_many_views(views: int) -> None:
     assert hit > 0.6
 
 
+@compiled_only
 def test_cells_of_few_views_fill_under_a_mean_alone() -> None:
     """A level of the mean that is right for four views is cleared by chance where two see the cell."""
     rng = np.random.default_rng(0)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from checks import drawn, numbers
 from hypothesis import strategies as st
 from scenes import body_box, looking, people, ring
-from strategies import drawn, numbers
 
 from stseg.arrays import Floats
 from stseg.bodies.outlines import outlines

@@ -6,16 +6,14 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from refusals import refused
+from checks import refused
 from simulated_people import ring
 
+from stseg import Recording, Rig, Source, align_rig, read_recording, write_rig
 from stseg.commands.calibrate.align import align
 from stseg.errors import CalibrationError, OutputError
-from stseg.geometry import Rig
 from stseg.geometry.ground_motion import GroundMotion
-from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.rigs import read_recording, write_rig
-from stseg.tasks.calibration.alignment import align_rig
+from stseg.io.recording.recording import CameraSource
 
 MOTION = GroundMotion(1.1 * np.exp(0.7j), 12.0 - 5.0j)
 PLACES = np.array([[-1.0, 0.5], [1.2, -0.8], [0.4, 1.1]])

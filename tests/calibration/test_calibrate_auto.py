@@ -6,14 +6,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from cases import cases
+from checks import cases, drawn, in_ci, refused
 from films import write_at_rate
 from hypothesis import strategies as st
-from recordings import in_ci
-from refusals import refused
 from simulated_people import Walking, changed, delayed, walking
-from strategies import drawn
 
+from stseg import Camera, Grid, read_recording
 from stseg.arrays import Bytes, Floats, Singles
 from stseg.calibration.adjusted_rig import cameras_of, centred, grid_of, offsets_of, reports_of, scaled
 from stseg.calibration.automatic import auto
@@ -35,8 +33,6 @@ from stseg.calibration.bundle_adjustment import adjust, residuals
 from stseg.calibration.pinhole import CENTRE, ENDS, SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto
 from stseg.errors import ConfigError, SourceError
-from stseg.geometry import Camera, Grid
-from stseg.io.recording.rigs import read_recording
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
 from stseg.simulation.rendering.room import render_room

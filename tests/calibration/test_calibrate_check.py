@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 from browser import CHROMIUM, Page, chromium
-from recordings import data_path, in_ci
-from refusals import refused
+from checks import data_path, in_ci, refused
 from simulated_people import SIZE, exchanged, moved, ring, shown, walkers
 
-from stseg.arrays import Boxes, Floats
+from stseg import Boxes, Camera, Recording, Rig, Source, read_recording, write_rig
+from stseg.arrays import Floats
 from stseg.calibration.check.blunders import match_frames
 from stseg.calibration.check.box_correspondence import isolated_boxes, tables_of
 from stseg.calibration.check.leave_one_out import locate
@@ -25,12 +25,10 @@ from stseg.commands.calibrate.app import app
 from stseg.commands.main import main
 from stseg.errors import ConfigError, OutputError
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.geometry import Camera, Rig
 from stseg.geometry.sampling import Sampling
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.recording.frames import open_frames
-from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.rigs import read_recording, write_rig
+from stseg.io.recording.recording import CameraSource
 from stseg.reporting.pictures.overlay import grid_picture
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig

@@ -6,14 +6,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from cases import cases
+from checks import cases, drawn, examples, in_ci, refused
 from films import write_at_rate
-from recordings import in_ci, track, write_recording
-from refusals import refused
+from recordings import track, write_recording
 from scenes import looking, rig_of, walkers
-from strategies import BARREL, Pose, drawn, examples, poses
+from strategies import BARREL, Pose, poses
 
-from stseg import errors
+from stseg import Camera, Grid, errors, evaluate, read_recording, read_run
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_fit import PointFit, fit_points
@@ -21,13 +20,9 @@ from stseg.calibration.points.point_requirements import require_plane
 from stseg.commands.calibrate.app import app
 from stseg.commands.calibrate.lens import calibrate_lens
 from stseg.errors import CalibrationError, ConfigError
-from stseg.evaluation.scores import evaluate
-from stseg.geometry import Camera, Grid
 from stseg.geometry.fits import fit_homography, focal_of_square_pixels, middle_matrix, vertical_of_matrix
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.calibrations.xml_files import read_opencv_lens
-from stseg.io.recording.rigs import read_recording
-from stseg.io.runfile.runs import read_run
 from stseg.tasks.calibration.points import fit_warnings
 
 SIZE = (640, 480)

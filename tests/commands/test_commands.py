@@ -14,20 +14,17 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attacks import RIG, film, write_rig
-from cases import cases
+from checks import Command, cases, refused
 from recordings import COMMAND, ENVIRONMENT, process
-from refusals import Command, refused
 from run_files import small_recording, small_trajectory, trajectory_of, write_empty_run, write_run, write_small_run
 
 import stseg
+from stseg import Grid, Lens, Rig, read_run, read_tracks_csv
 from stseg.arrays import Floats
 from stseg.commands.inspect import event_counts_text
 from stseg.commands.main import COMMANDS, main
 from stseg.errors import CalibrationError, OutputError
-from stseg.geometry import Grid, Lens, Rig
 from stseg.geometry.lens import LensModel
-from stseg.io.runfile.runs import read_run
-from stseg.io.track_csv import read_tracks_csv
 from stseg.tasks.overview import summarise_run
 
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from recordings import in_ci
+from checks import in_ci
 
 from stseg.kernels.accelerate import COMPILED
 

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from cases import cases
+from checks import Command, cases, drawn, refused
 from hypothesis import strategies as st
-from refusals import Command, refused
-from strategies import drawn
 
 from stseg.config import BodyConfig, Config
 from stseg.config.keys import USER_KEYS, describe, require_effect, values

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import refused
+from checks import refused
 from scenes import boxes, corner_cameras, found, mask, people, rig_of
 
 from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence

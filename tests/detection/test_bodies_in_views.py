@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import drawn, numbers
 from hypothesis import example
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, likelihoods, looking, people, rig_of, room
-from strategies import drawn, numbers
 
 import stseg
 from stseg.arrays import Flags, Floats, Singles

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from checks import compiled_only
 from scenes import (
     BODY,
     FEW_HEIGHTS,
@@ -65,7 +66,7 @@ def test_a_child_is_found_though_its_height_is_not_tried(place: tuple[float, flo
     np.testing.assert_allclose(explanation.people.height, 1.0, atol=0.11)
 
 
-@pytest.mark.parametrize("tall", [1.0, 1.1, 1.2, 1.4, 1.66, 1.97])
+@pytest.mark.parametrize("tall", [1.0, *(pytest.param(k, marks=compiled_only) for k in (1.1, 1.2, 1.4, 1.66, 1.97))])
 def test_bodies_of_all_heights_are_found_by_boxes(tall: float) -> None:
     cameras = tuple(looking(f"{x}{y}", (x, y, 2.4), size=(640, 480), focal=375.0) for x in (-3, 3) for y in (-3, 3))
     standing = people((0.3, -0.4, tall), (-0.8, 0.3, 1.75))
@@ -75,6 +76,7 @@ def test_bodies_of_all_heights_are_found_by_boxes(tall: float) -> None:
     np.testing.assert_allclose(explanation.people.height[index], standing[:, 2], atol=0.08)
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_pixels_and_boxes_are_assigned_to_people(kind: str) -> None:
     rig = room()
@@ -91,6 +93,7 @@ def test_pixels_and_boxes_are_assigned_to_people(kind: str) -> None:
         assert sorted(owners.tolist()) == ([nearest, far] if nearest < far else [far, nearest]) * (kind == "boxes")
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_behind_the_other_in_a_view(kind: str) -> None:
     rig = room()
@@ -106,6 +109,7 @@ def test_one_behind_the_other_in_a_view(kind: str) -> None:
         assert explanation.people.view_evidence[0, far] > -1.0  # a box that is not expected is not missed
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_person_hidden_from_all_but_two_views_stays(kind: str) -> None:
     rig = room()
@@ -144,6 +148,7 @@ def only(explanation: Explanation) -> tuple[float, float, int]:
     return float(evidence), float(prior), int(track)
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_birth_costs_inside_and_not_at_the_border(kind: str) -> None:
     """The evidence of the views stays the same; the prior does not."""
@@ -158,6 +163,7 @@ def test_a_birth_costs_inside_and_not_at_the_border(kind: str) -> None:
         assert only(first)[2] == only(later)[2] == -1
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_births_cost_nothing_in_the_first_frame(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62), (0.1, 1.2, 1.6))
@@ -174,6 +180,7 @@ def test_births_cost_nothing_in_the_first_frame(kind: str) -> None:
     assert (found.prior <= FEW_HEIGHTS.prior_log_odds).all()
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_tracks_are_assigned_to_the_people_found(kind: str) -> None:
     """A person continues one track at most, and a track is one person at most; heights tell two apart."""
@@ -203,6 +210,7 @@ def test_a_track_stays_though_one_view_alone_shows_it() -> None:
     assert_found(room_detector("boxes").explain(views, expecting(*tracked)), nearer)
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_blind_view_is_no_evidence(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62))
@@ -227,6 +235,7 @@ def test_no_people_and_no_ghosts_without_evidence() -> None:
     assert len(three.explain([boxes(room().cameras[0], people())] * 3, None).ghosts) == 0
 
 
+@compiled_only
 def test_view_evidence_is_in_the_order_of_the_rig() -> None:
     """A rig that mixes both kinds: what a view says stands in that view's row."""
     cameras = room().cameras
@@ -241,6 +250,7 @@ def test_view_evidence_is_in_the_order_of_the_rig() -> None:
         assert [bool(p < 0) for p in parts] == [k == empty for k in range(4)], (empty, parts)
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_same_frame_twice(kind: str) -> None:
     rig = room()

@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 from scenes import CONFIG, boxes, corner_cameras, detector_of, evidence_of, expecting, looking, mask, people, rig_of
 
+from stseg import CommittedFrames, FrameSet, Rig
 from stseg.arrays import Floats, Shorts, Singles
 from stseg.detection.detector import Detector
 from stseg.detection.evidence.pillar_evidence import fill_scores
 from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels
 from stseg.detection.prior import Prior
-from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.geometry import Rig
 from stseg.geometry.distances import distances
-from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
 from stseg.records.tables import Tracks
 from stseg.tracking.filter.assignment import assign

@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import examples, in_ci
 from crafted_frames import in_rooms, random_frame
-from recordings import in_ci
 from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, people, room
-from strategies import examples
 
 from stseg.arrays import Boxes, Floats, Ints, Singles, ViewEvidence
 from stseg.bodies.outlines import outlines

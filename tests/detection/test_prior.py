@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import compiled_only, drawn, numbers
 from hypothesis import strategies as st
 from scenes import corner_cameras, expecting, looking, rig_of
 from scipy.stats import multivariate_normal, norm
-from strategies import drawn, numbers
 
 from stseg.arrays import Floats
 from stseg.config import BodyConfig, DetectionConfig
@@ -119,6 +119,7 @@ def test_a_birth_costs_away_from_the_border() -> None:
     np.testing.assert_array_equal(Prior.of(None, CONFIG, BODY, border).birth_cost(places), 0.0)
 
 
+@compiled_only
 def test_births_cost_nothing_at_doors_and_all_at_walls() -> None:
     rig = open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2))
     places = np.array([[0.0, 0.0], [0.5, 0.0], [1.3, 0.0], [-2.95, 0.0], [-3.5, 0.0]])

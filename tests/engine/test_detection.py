@@ -11,22 +11,20 @@ from typing import Any
 import detector_models
 import numpy as np
 import pytest
+from checks import Command, compiled_only
 from films import regular, write_at_rate, write_stamped
-from recordings import assert_same, compiled_only, track
-from refusals import Command
+from recordings import assert_same, track
 from scenes import SIZE, body_box, corner_cameras, mask, rig_of
 
-from stseg import detect
-from stseg.arrays import Boxes, Bytes
+from stseg import Boxes, Recording, Source, detect, read_recording, read_run
+from stseg.arrays import Bytes
 from stseg.io.detectors import detected_boxes
 from stseg.io.detectors.people_detector import OnnxDetector
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.frames import open_frames
-from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.recording import CameraSource
 from stseg.io.recording.rig_text import format_rig
-from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.streams import open_boxes
-from stseg.io.runfile.runs import read_run
 
 FRAMES = 24
 CAMERAS = corner_cameras()

@@ -14,23 +14,21 @@ import numpy as np
 import pytest
 import recordings
 from arrivals import FRAMES, StandIn, arrive, films, meanwhile, write_pieces
+from checks import Command, compiled_only, in_ci
 from films import write_at_rate
-from recordings import COMMAND, PLACES, assert_same, compiled_only, filmed_rig, in_ci, run_words, started
-from refusals import Command
+from recordings import COMMAND, PLACES, assert_same, filmed_rig, run_words, started
 from run_files import table_of, trajectory_of
 from scenes import walkers
 
 import stseg.engine.live.following
+from stseg import evaluate, read_run, read_tracks_csv
 from stseg.arrays import Rows
 from stseg.engine.live.following import last_frame
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
-from stseg.evaluation import evaluate
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.live_tables import CorrectionTable
-from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
-from stseg.io.track_csv import read_tracks_csv
 from stseg.records.tables import CORRECTION, TRAJECTORY
 from stseg.tracking.windows.windows import ENDLESS
 from stseg.trajectories.live_ids import LiveCorrections, LiveIds, corrected_ids

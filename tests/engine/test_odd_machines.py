@@ -13,16 +13,15 @@ from typing import Any
 import h5py
 import pytest
 from attacks import write_rig
-from recordings import COMMAND, OPTIONS, assert_same, compiled_only, in_ci, process, track, write_recording
-from refusals import Command
+from checks import Command, compiled_only, in_ci
+from recordings import COMMAND, OPTIONS, assert_same, process, track, write_recording
 from run_files import write_small_run
 
+from stseg import read_recording, read_run
 from stseg.commands.main import main
 from stseg.errors import printable
 from stseg.io.outputs.whole_files import create_part, replacing
-from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.provenance import gather_provenance, run_request
-from stseg.io.runfile.reading.run_reader import read_run
 from stseg.io.runfile.unfinished import part_file
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")

@@ -10,21 +10,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import in_ci
-from refusals import refused
+from checks import in_ci, refused
 from scenes import CONFIG, box_frame_sets, mask_frame_sets, room, walkers
 
 import stseg
-from stseg.arrays import Boxes, Ints, Labels, Rows
+from stseg import Boxes, CommittedFrames, Config, FrameSet, evaluate
+from stseg.arrays import Ints, Labels, Rows
 from stseg.commands.simulate import simulate
-from stseg.config import Config, TrackingConfig
-from stseg.engine.committed_frames import CommittedFrames
+from stseg.config import TrackingConfig
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.errors import SourceError
-from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.io.recording.frames import FrameSet
 from stseg.kernels.accelerate import COMPILED
 from stseg.records.tables import CANDIDATE, RATES, TIMING, Tracks
 from stseg.trajectories.final_tracks import CommittedRows

@@ -14,8 +14,8 @@ import h5py
 import numba
 import numpy as np
 import pytest
-from recordings import FRAMES, OPTIONS, assert_same, compiled_only, track
-from refusals import Command, refused
+from checks import Command, compiled_only, refused
+from recordings import FRAMES, OPTIONS, assert_same, track
 from run_files import write_small_run
 from scenes import box_frame_sets, corner_cameras, rig_of, walkers
 

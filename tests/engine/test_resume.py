@@ -15,18 +15,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from cases import cases
+from checks import Command, cases, compiled_only, drawn, in_ci
 from hypothesis import example
 from hypothesis.strategies import integers, sampled_from
-from recordings import COMMAND, FRAMES, PLACES, assert_same, compiled_only, in_ci, process, run_words, started, track
-from refusals import Command
+from recordings import COMMAND, FRAMES, PLACES, assert_same, process, run_words, started, track
 from scenes import walkers
-from strategies import drawn
 
-from stseg.config import Config
-from stseg.evaluation import evaluate
+from stseg import Config, evaluate, read_run
 from stseg.io.config_file import format_config
-from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_files import checksum
 
 SLOW_DISK = """

@@ -15,21 +15,18 @@ from typing import Any
 
 import distributed
 import pytest
-from cases import cases
+from checks import Command, cases, compiled_only, refused
 from cluster import Cluster, started_cluster
-from recordings import ENVIRONMENT, FRAMES, assert_same, compiled_only, process, run_words, track, write_recording
-from refusals import Command, refused
+from recordings import ENVIRONMENT, FRAMES, assert_same, process, run_words, track, write_recording
 from scenes import corner_cameras, rig_of
 
 import stseg
-from stseg.config import Config
+from stseg import Config, Grid, read_recording
 from stseg.engine.memory import ground_note, process_memory
 from stseg.engine.workers import worker_processes
 from stseg.engine.workers.worker_processes import processes_that_fit
 from stseg.engine.workers.workforce import Workforce
 from stseg.errors import ConfigError
-from stseg.geometry import Grid
-from stseg.io.recording.rigs import read_recording
 
 pytestmark = compiled_only
 

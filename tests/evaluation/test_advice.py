@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import cases
-from recordings import data_path
+from checks import cases, data_path
 from scenes import walkers
 
 from stseg.arrays import Rows

@@ -12,12 +12,10 @@ from typing import Any, Literal, cast
 import numpy as np
 import pytest
 import reference_evaluation as reference
+from checks import data_path, drawn, refused
 from cyclopts import App
 from hypothesis import strategies as st
-from recordings import data_path
-from refusals import refused
 from run_files import table_of
-from strategies import drawn
 
 from stseg.arrays import Flags, Ints, Rows
 from stseg.commands.evaluate import evaluate as command

@@ -7,11 +7,10 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 import pytest
 import reference_foreground as reference
+from checks import compiled_only, drawn, refused
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from reference_foreground import FLOOR, SHIRT, near_modes, noisy
-from refusals import refused
-from strategies import drawn
 
 from stseg.arrays import Bytes
 from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
@@ -73,6 +72,7 @@ def test_the_likelihood_is_a_posterior_with_the_given_prior(kind: type[Backgroun
     assert likelihood[MIDDLE] > 0.98 and ((likelihood > 0) & (likelihood < 1)).all()
 
 
+@compiled_only
 @every_model
 def test_a_person_who_stands_for_a_minute_does_not_fade(kind: type[Background]) -> None:
     model, rng = taught(kind), np.random.default_rng(4)
@@ -92,6 +92,7 @@ def test_a_shadow_stays_background_softly_and_teaches_nothing(kind: type[Backgro
     assert model.likelihood(room())[MIDDLE] < 0.02
 
 
+@compiled_only
 @every_model
 def test_a_part_of_the_scene_may_change_slowly(kind: type[Background]) -> None:
     changed = (FLOOR[0] + 50, FLOOR[1], FLOOR[2] + 30)
@@ -113,6 +114,7 @@ def test_a_chair_becomes_background_after_the_absorption(kind: type[Background])
     assert model.likelihood(room())[MIDDLE] < 0.1  # its leaving is no ghost
 
 
+@compiled_only
 @every_model
 def test_light_that_changes_at_once_or_slowly_is_no_person(kind: type[Background]) -> None:
     scene = np.random.default_rng(5).integers(40, 160, (24, 24, 3)).astype(np.uint8)

@@ -7,14 +7,12 @@ import cv2
 import numpy as np
 import pytest
 import reference_foreground as reference
+from checks import compiled_only, data_path, drawn, refused
 from hypothesis import example
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
-from recordings import data_path
 from reference_foreground import FLOOR, SHIRT, near_modes, noisy, random_modes
-from refusals import refused
-from strategies import drawn
 
 from stseg.arrays import Boxes, Bytes, Floats
 from stseg.config import ChromaticConfig
@@ -258,6 +256,7 @@ def test_instance_boxes_are_tight(instances: NDArray[np.uint16]) -> None:
     refused(SourceError, "expected", instance_boxes, instances.astype(np.uint8))
 
 
+@compiled_only
 def test_people_in_a_real_room_are_found() -> None:
     model = Mixture((129, 98), 5.0)
     for image in _frames(data_path("uu4/cam1/background.avi"), 8):

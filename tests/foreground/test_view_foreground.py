@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from checks import drawn, refused
 from hypothesis import strategies as st
-from refusals import refused
-from strategies import drawn
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Singles
 from stseg.config import ForegroundConfig

@@ -12,22 +12,17 @@ from typing import Any
 import h5py
 import numpy as np
 
-from stseg.arrays import Boxes, Floats, Rows
-from stseg.config import Config
-from stseg.errors import InputError, StsegError
-from stseg.geometry import Camera
+from stseg import Boxes, Camera, Config, InputError, Recording, Run, Source, StsegError, read_config, read_tracks_csv
+from stseg.arrays import Floats, Rows
 from stseg.identities.review.corrections import ACTIONS
 from stseg.io.answers import AnswerRow
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.point_files import PointTable
-from stseg.io.config_file import as_toml, read_config
-from stseg.io.recording.recording import Recording, Source
+from stseg.io.config_file import as_toml
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig
 from stseg.io.recording.streams import open_stream
 from stseg.io.runfile import layout
-from stseg.io.runfile.runs import Run
-from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
 
 _LINE = 1000

@@ -17,34 +17,29 @@ from run_files import small_trajectory, write_small_run
 from fuzz import corpus, oracles
 from fuzz.corpus import GREY, RAMP, Maker, encoded, text
 from fuzz.mutations import mutated, mutated_objects
-from stseg.arrays import Boxes
+from stseg import Boxes, Camera, Source, StsegError, read_config, read_recording, read_run, read_tracks_csv
 from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_fit import fit_points
 from stseg.commands.calibrate.page import calibrate_page
 from stseg.commands.correct import correct
 from stseg.commands.measure import measure
 from stseg.commands.review import review
-from stseg.errors import StsegError
-from stseg.geometry import Camera
 from stseg.identities.review.corrections import ACTIONS, Answer, solve_corrections
 from stseg.io.answers import read_answers, read_names
 from stseg.io.areas import read_lines, read_polygons
 from stseg.io.calibrations.formats import FORMATS, ImportOptions, read_cameras
 from stseg.io.calibrations.point_files import read_points
-from stseg.io.config_file import read_config
 from stseg.io.exports import formats as exports
 from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.live_tables import CorrectionTable, LiveTable
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.pictures import read_picture
-from stseg.io.recording.recording import Source, SourceKind
-from stseg.io.recording.rigs import parse_rig, read_recording
+from stseg.io.recording.recording import SourceKind
+from stseg.io.recording.rigs import parse_rig
 from stseg.io.recording.streams import open_stream
 from stseg.io.recording.video.video_stream import VideoStream
-from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
-from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
 from stseg.measures.areas import Line, Zone
 from stseg.records.tables import Tracks

@@ -5,25 +5,24 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from checks import compiled_only, drawn, numbers
 from hypothesis import assume, example
 from hypothesis import strategies as st
-from recordings import compiled_only, track
+from recordings import track
 from reference_geometry import project_by_matrix, project_by_opencv
 from scenes import looking
-from strategies import BARREL, FISHEYE, LENSES, Pose, cameras, drawn, grids, numbers, poses, rigs
+from strategies import BARREL, FISHEYE, LENSES, Pose, cameras, grids, poses, rigs
 
+from stseg import Camera, Grid, Lens, Recording, Rig, Source, read_recording, read_run
 from stseg.arrays import Floats
 from stseg.commands.main import main
 from stseg.errors import CalibrationError
-from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.grid import inside_polygon
 from stseg.geometry.lens import LensModel
 from stseg.geometry.rig import greatest_reduction
 from stseg.geometry.sampling import LensTerms, pixel_of
 from stseg.io.recording.frames import open_frames, read_background
-from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.rigs import read_recording
-from stseg.io.runfile.runs import read_run
+from stseg.io.recording.recording import CameraSource
 
 MATRIX = np.array([[492.3, 0.0, 341.1], [0.0, 494.7, 225.1], [0.0, 0.0, 1.0]])
 LENS, WIDE = Lens(MATRIX, np.array(BARREL)), Lens(MATRIX, np.array(FISHEYE), "fisheye")
@@ -227,6 +226,7 @@ class TestGrid:
 
 
 class TestRig:
+    @compiled_only
     @drawn(100, rigs())
     def test_that_watches_its_area(self, rig: Rig) -> None:
         rig.require_coverage()

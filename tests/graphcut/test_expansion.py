@@ -6,10 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 import reference_expansion as reference
+from checks import compiled_only, drawn, refused
 from hypothesis import strategies as st
 from maxflow.fastmin import aexpansion_grid
-from refusals import refused
-from strategies import drawn
 
 from stseg.arrays import Ints
 from stseg.graphcut import qpbo
@@ -89,6 +88,7 @@ def test_no_expansion_improves_the_result(seed: int, shape: tuple[int, ...]) -> 
         assert all(reference.energy_of(energy, other) >= least for other in reference.expansions(energy, labels, alpha))
 
 
+@compiled_only
 @pytest.mark.parametrize("shape", [(4, 5, 3), (3, 2, 4, 3)])
 @pytest.mark.parametrize("weight", [0, 2, 6])
 def test_pruning_changes_nothing(shape: tuple[int, ...], weight: int) -> None:
@@ -101,6 +101,7 @@ def test_pruning_changes_nothing(shape: tuple[int, ...], weight: int) -> None:
             np.testing.assert_array_equal(labels, expand(energy, start))
 
 
+@compiled_only
 @pytest.mark.parametrize("admissible", [0.6, 1.0])
 def test_with_one_weight_the_result_is_that_of_aexpansion_grid(admissible: float) -> None:
     shape, labels = (3, 2, 4, 5), 4
@@ -165,6 +166,7 @@ def test_the_minimum_is_that_of_all_labellings(seed: int, nodes: int, edges: int
         assert energy.of(found.labels) == least(energy) and found.gap == 0
 
 
+@compiled_only
 @drawn(30, seed=st.integers(0, 9999))
 def test_the_gap_bounds_what_local_search_misses(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(qpbo, "COMPONENT_LIMIT", 0)

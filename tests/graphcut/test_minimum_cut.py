@@ -8,12 +8,11 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import compiled_only, drawn, refused
 from hypothesis import strategies as st
-from recordings import compiled_only, track
-from refusals import refused
+from recordings import track
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
-from strategies import drawn
 
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
@@ -201,6 +200,7 @@ def test_sparse_cut_of_extremes() -> None:
     refused(OverflowError, "capacities", sparse_cut, endless, start, end, CAPACITY_LIMIT * one, one)
 
 
+@compiled_only
 def test_cuts_in_two_threads_at_once_agree() -> None:
     """Many windows in a row, so that the memory of one is reused by the next; a race would differ."""
     windows = [smooth_window(seed, (6, 3, 9, 9), smoothness=2.5) for seed in range(3)]

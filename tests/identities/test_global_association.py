@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from checks import drawn
 from hypothesis import example
 from hypothesis import strategies as st
 from simulated_people import BORDER, CONFIG, RATE, Path, committed, gone, rows_of, runs, straight, swapped, visit
-from strategies import drawn
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally

@@ -6,11 +6,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from checks import drawn, refused
 from hypothesis import strategies as st
 from reference_identities import greatest_score, score
-from refusals import refused
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
-from strategies import drawn
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.commands.correct import correct

@@ -8,10 +8,10 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
+from checks import drawn
 from hypothesis import strategies as st
 from run_files import table_of
 from scenes import room
-from strategies import drawn
 
 from stseg.arrays import Rows
 from stseg.config import Config, LiveConfig

@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from refusals import refused
+from checks import refused
 from run_files import write_small_run
 from simulated_people import BORDER, CONFIG, RATE, committed, rows_of, straight
 

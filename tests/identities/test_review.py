@@ -8,20 +8,18 @@ import h5py
 import numpy as np
 import pytest
 from browser import CHROMIUM, chromium
-from recordings import in_ci
-from refusals import refused
+from checks import in_ci, refused
 from run_files import table_of, write_small_run
 
+from stseg import InputError, read_run
 from stseg.arrays import Floats, Rows
 from stseg.commands.correct import correct
 from stseg.commands.export import export
 from stseg.commands.report import report
 from stseg.commands.review import review
-from stseg.errors import InputError
 from stseg.identities.review.corrections import ACTIONS, Answer, Corrections, solve_corrections
 from stseg.identities.review.doubts import _together, find_doubts
 from stseg.io.answers import read_answers
-from stseg.io.runfile.runs import read_run
 from stseg.records.tables import TRACK, TRAJECTORY, Tracks
 from stseg.tasks.review import question_words
 

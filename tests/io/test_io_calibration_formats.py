@@ -7,26 +7,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import cases
-from recordings import data_path
+from checks import cases, data_path, refused
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
-from refusals import refused
 from scenes import rotation_towards
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 from strategies import BARREL, FISHEYE
 
+from stseg import Camera, InputError, read_recording
 from stseg.arrays import Floats
 from stseg.commands.calibrate.app import app
-from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
-from stseg.geometry import Camera
+from stseg.errors import CalibrationError, ConfigError, FormatError
 from stseg.geometry.lens import LensModel
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.matrices import read_pom, read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, median_height, require_median_height
 from stseg.io.calibrations.xml_files import read_tsai_xml
-from stseg.io.recording.rigs import read_recording
 
 SIZE = (640, 480)
 MATRIX = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])

@@ -3,24 +3,20 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from cases import cases
+from checks import cases, data_path, drawn, numbers, refused
 from cyclopts import CycloptsError
 from hypothesis import strategies as st
-from recordings import data_path
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
-from refusals import refused
-from strategies import BARREL, Pose, drawn, numbers, poses
+from strategies import BARREL, Pose, poses
 
-from stseg import errors
+from stseg import Camera, errors, read_recording
 from stseg.arrays import Floats
 from stseg.commands.calibrate.app import app
 from stseg.errors import CalibrationError, ConfigError, FormatError
-from stseg.geometry import Camera
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.matrices import read_projection
 from stseg.io.calibrations.world_frame import Up, World
 from stseg.io.calibrations.xml_files import read_opencv_xml
-from stseg.io.recording.rigs import read_recording
 
 SIZE = (640, 480)
 MATRIX = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])

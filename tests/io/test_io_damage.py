@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import refused
 from films import regular, write_at_rate, write_stamped
 from recordings import blank_recording
-from refusals import refused
 from run_files import small_recording, write_small_run
 
 from stseg.arrays import Bytes

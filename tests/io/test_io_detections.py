@@ -8,22 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attacks import write_rig
-from cases import cases, frozen, tables
+from checks import cases, data_path, drawn, frozen, refused, tables
 from hypothesis import strategies as st
-from recordings import data_path
-from refusals import refused
-from strategies import drawn
 
+from stseg import Camera, InputError, Source, read_recording
 from stseg.arrays import Bytes
 from stseg.commands.inspect import inspect
-from stseg.errors import FormatError, InputError, RigError, SourceError
-from stseg.geometry import Camera
+from stseg.errors import FormatError, RigError, SourceError
 from stseg.io.detections.box_files import read_boxes
 from stseg.io.detections.masks import run_lengths
 from stseg.io.detections.record import Detections, listed_frames
 from stseg.io.detections.source_detections import instance_image, read_source
-from stseg.io.recording.recording import Source
-from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.streams import open_stream
 
 SIZE = (80, 60)

@@ -22,17 +22,15 @@ import pytest
 import shapely
 import shapely.geometry
 import xarray
+from checks import Command, data_path, drawn, refused
 from hypothesis import strategies as st
-from recordings import data_path
-from refusals import Command, refused
 from run_files import FRAMES, small_recording, small_trajectory, table_of, trajectory_of, write_run, write_small_run
-from strategies import drawn
 
+from stseg import Grid, Run, Source, read_run
 from stseg.arrays import Rows
 from stseg.commands.export import export
 from stseg.commands.main import main
 from stseg.errors import ConfigError
-from stseg.geometry import Grid
 from stseg.io.detections.box_files import read_boxes
 from stseg.io.detections.source_detections import read_source
 from stseg.io.exports.benchmarks import wildtrack_positions, wildtrack_size
@@ -41,8 +39,6 @@ from stseg.io.exports.geographic import BEGINNING
 from stseg.io.exports.movement import headings
 from stseg.io.exports.row_counts import ROW_COUNTS
 from stseg.io.extras import load_extra
-from stseg.io.recording.recording import Source
-from stseg.io.runfile.runs import Run, read_run
 from stseg.records.tables import BOX, TRAJECTORY
 
 with warnings.catch_warnings():  # it tells on import of what it could do with more libraries

@@ -8,13 +8,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from cases import cases
+from checks import cases, data_path, drawn, refused
 from films import write_at_rate
 from hypothesis import assume
 from hypothesis import strategies as st
-from recordings import blank_recording, data_path
-from refusals import refused
-from strategies import drawn
+from recordings import blank_recording
 
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError

@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from refusals import Command, refused
+from checks import Command, refused
 from run_files import write_run
 from scenes import box_frame_sets, looking, mask_frame_sets, rig_of, standing_at, walkers
 

@@ -11,9 +11,9 @@ from threading import Event, Timer, current_thread
 import numpy as np
 import pytest
 from arrivals import FRAMES, PIECE, StandIn, arrive, meanwhile, write_pieces
+from checks import refused
 from films import write_at_rate
 from recordings import PLACES, filmed_rig
-from refusals import refused
 
 from stseg.arrays import AnyArray, Bytes
 from stseg.config import LiveConfig

@@ -7,12 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from cases import cases
+from checks import cases, drawn, refused
 from films import write_at_rate
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from refusals import refused
-from strategies import drawn
 
 from stseg.arrays import Bytes, Floats
 from stseg.errors import SourceError

@@ -4,19 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import compiled_only
 from films import TICK, Film, regular, standing, write_at_rate, write_films
-from recordings import assert_same, compiled_only
+from recordings import assert_same
 from scenes import FRAME_RATE
 
+from stseg import Camera, Config, Grid, Recording, Rig, Run, Source, read_run
 from stseg.arrays import Floats
 from stseg.commands.main import main
-from stseg.config import Config, SegmentConfig
+from stseg.config import SegmentConfig
 from stseg.engine.offline.backgrounds import make_foregrounds
-from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.frames import read_camera
-from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.runfile.runs import Run, read_run
+from stseg.io.recording.recording import CameraSource
 
 pytestmark = compiled_only
 

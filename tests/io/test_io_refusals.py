@@ -15,13 +15,12 @@ import h5py
 import numpy as np
 import pytest
 from attacks import film, write_rig
-from cases import cases, frozen, tables
-from refusals import refused
+from checks import cases, frozen, refused, tables
 
-from stseg.errors import ConfigError, FormatError, InputError, OutputError, SourceError
+from stseg import InputError, Source, read_config, read_recording, read_run, read_tracks_csv
+from stseg.errors import ConfigError, FormatError, OutputError, SourceError
 from stseg.io.answers import read_answers, read_names
 from stseg.io.calibrations.formats import ImportOptions, read_cameras
-from stseg.io.config_file import read_config
 from stseg.io.detections.source_detections import read_source
 from stseg.io.exports.archive import ARCHIVES
 from stseg.io.live.arriving_files import FileNotes
@@ -30,15 +29,11 @@ from stseg.io.live.live_tables import LiveTable
 from stseg.io.outputs import simulated_scene
 from stseg.io.outputs.video_writer import write_film
 from stseg.io.outputs.whole_files import clear_frames, publish_part
-from stseg.io.recording.recording import Source
-from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.io.runfile.corrected import write_corrected
-from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_files import read_stream_times
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.io.toml import parse_toml
-from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_bytes
 from stseg.io.untrusted.numpy_files import parse_npy, read_npz

@@ -3,10 +3,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import cases
+from checks import cases, drawn, refused
 from hypothesis import strategies as st
-from refusals import refused
-from strategies import drawn, recordings
+from strategies import recordings
 
 from stseg.errors import InputError, OutputError, RigError
 from stseg.io.recording.recording import CameraSource, Recording, Source

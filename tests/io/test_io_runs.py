@@ -15,9 +15,8 @@ from unittest.mock import Mock
 import h5py
 import numpy as np
 import pytest
-from cases import cases
-from recordings import assert_same, in_ci
-from refusals import refused
+from checks import cases, in_ci, refused
+from recordings import assert_same
 from run_files import (
     CONFIG,
     FRAMES,

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import drawn, refused
 from films import write_at_rate, write_stamped
 from hypothesis import strategies as st
 from recordings import blank_recording
-from refusals import refused
-from strategies import drawn
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation
 from stseg.engine.offline.segments import find_gaps

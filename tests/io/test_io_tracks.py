@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import drawn, refused
 from hypothesis import strategies as st
-from refusals import refused
 from run_files import table_of
-from strategies import drawn
 
 from stseg.errors import FormatError, OutputError
 from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv

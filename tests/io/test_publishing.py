@@ -16,7 +16,7 @@ from unittest.mock import MagicMock, Mock
 import numpy as np
 import pytest
 from arrivals import meanwhile
-from refusals import Command, refused
+from checks import Command, refused
 from run_files import table_of
 
 from stseg.arrays import Rows

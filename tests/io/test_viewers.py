@@ -16,8 +16,7 @@ import shapely
 import silx.io
 import silx.io.nxdata
 import xarray
-from recordings import data_path
-from refusals import refused
+from checks import data_path, refused
 from run_files import FRAMES, small_ghosts, small_trajectory, small_volume, write_small_run
 
 from stseg.commands.main import main

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from checks import in_ci, refused
 from numba.core.caching import NullCache
-from recordings import in_ci, process, started
-from refusals import refused
+from recordings import process, started
 
 from stseg.arrays import Floats, Ints
 from stseg.kernels import accelerate

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import cases
-from refusals import refused
+from checks import cases, refused
 from run_files import table_of, trajectory_of, write_small_run
 from scipy.signal import lfilter
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from checks import drawn, numbers
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, expecting, likelihoods, people, room
 from scipy.signal import lfilter
 from scipy.special import expit
-from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.bodies.outlines import outlines

@@ -7,11 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from checks import drawn, refused
 from hypothesis import strategies as st
-from refusals import refused
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, expecting, found, likelihoods, people, rig_of, room
 from scipy.ndimage import maximum_filter
-from strategies import drawn
 
 from stseg.arrays import Boxes, Floats, Singles, ViewEvidence
 from stseg.bodies import box_fit

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 import reference_error_rates as reference
+from checks import compiled_only, drawn
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, likelihoods, no_boxes, people, rig_of
-from strategies import drawn
 
 from stseg.arrays import Flags, Floats, Ints, ViewEvidence
 from stseg.bodies.pillars import inside_bodies
@@ -88,6 +88,7 @@ def test_rates_of_some_cells_are_those_of_all(monkeypatch: pytest.MonkeyPatch) -
     assert (found[1] != found[0]).any()
 
 
+@compiled_only
 def test_rates_are_found() -> None:
     """A stream of frames of known rates; three views, of which the first errs most."""
     true = [ErrorRates(0.35, 0.15, 0.45), ErrorRates(0.1, 0.02, 0.3), ErrorRates(0.1, 0.02, 0.3)]
@@ -175,6 +176,7 @@ def occupancy(kind: str) -> Occupancy:
     return Occupancy(RIG, [kind] * 4, OccupancyConfig(), FEW_HEIGHTS, BODY, CONFIG)
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_a_frame_is_fused_by_those_before_it(kind: str) -> None:
     fusion = occupancy(kind)
@@ -187,6 +189,7 @@ def test_a_frame_is_fused_by_those_before_it(kind: str) -> None:
     assert all(r.near_clutter > r.clutter for r in running.rates)
 
 
+@compiled_only
 def test_going_on_from_a_state_is_going_on() -> None:
     """Wherever a recording is divided, its parts in order say what the whole says."""
     frames = [frame("pixels", k) for k in range(3)]

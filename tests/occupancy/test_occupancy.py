@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import compiled_only, drawn, numbers
 from hypothesis import example
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, detector_of, evidence_of, found, looking, people, rig_of
-from strategies import drawn, numbers, rigs
+from strategies import rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
 from stseg.bodies.box_fit import TOLERANCE
@@ -227,6 +228,7 @@ def test_fusion_by_definition(kind: SamplingKind, blind: Sequence[int], step: in
     np.testing.assert_allclose(fused, volume_by_definition(PARTIAL, maps, explanation, kind), atol=LEVEL)
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With every block marked, no cell has a representative; rates are the same up to the order of sums."""
@@ -290,6 +292,7 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     np.testing.assert_array_equal(half_says[0][~near_person], whole_says[0][~near_person])
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     rig = rig_of(corner_cameras())
@@ -307,6 +310,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody).dense() < PRIOR).all()
 
 
+@compiled_only
 def test_the_same_frame_twice() -> None:
     occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
     explanation = explained(COARSE, people((0.2, 0.3)))

@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 import reference_pixel_labels as reference
+from checks import drawn
 from hypothesis import strategies as st
 from scenes import corner_cameras, likelihoods, looking, people, room
-from strategies import drawn
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
 from stseg.bodies.outlines import outlines

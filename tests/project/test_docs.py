@@ -11,7 +11,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
-from recordings import compiled_only, in_ci
+from checks import compiled_only, in_ci
 
 from stseg.commands.main import COMMANDS, _app
 from stseg.config import Config

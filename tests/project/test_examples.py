@@ -10,8 +10,7 @@ import pedpy
 import pytest
 from run_files import small_recording, table_of, write_run
 
-from stseg.geometry import Grid
-from stseg.io.runfile.runs import Run, read_run
+from stseg import Grid, Run, read_run
 from stseg.records.tables import TRAJECTORY
 from stseg.simulation import NAMED
 from stseg.simulation.crowd.social_forces import walk_freely

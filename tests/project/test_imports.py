@@ -7,7 +7,7 @@ from functools import cache, cached_property
 from pathlib import Path
 
 import pytest
-from cases import tables
+from checks import tables
 from recordings import process
 
 ROOT = Path(__file__).parents[2]

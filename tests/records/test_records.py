@@ -9,10 +9,9 @@ from run_files import small_volume, table_of, write_small_run
 from scenes import room
 from scipy.special import expit
 
+from stseg import Grid, read_run
 from stseg.config import BodyConfig
-from stseg.geometry import Grid
 from stseg.geometry.rig import BODY_HEIGHT
-from stseg.io.runfile.runs import read_run
 from stseg.records import cell_reliability
 from stseg.records.border import Border
 from stseg.records.forgetting import Forgetting

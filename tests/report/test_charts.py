@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 import pytest
+from checks import drawn
 from hypothesis import strategies as st
 from run_files import table_of, trajectory_of
-from strategies import drawn
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 import run_files
+from checks import drawn
 from hypothesis import strategies as st
-from strategies import drawn
 
 from stseg.arrays import AnyArray, Bytes, Labels, Rows, Singles
 from stseg.commands.report import report

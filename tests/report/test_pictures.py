@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import run_files
 import strategies
+from checks import drawn
 from hypothesis import strategies as st
 from run_files import trajectory_of
 from scenes import looking
-from strategies import drawn
 
 from stseg.arrays import AnyArray, Boxes, Bytes, Rows
 from stseg.geometry import Camera, Grid, Rig

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 import run_files
 from browser import CHROMIUM, chromium
-from cases import cases
+from checks import Command, cases, refused
 from numpy.typing import ArrayLike
-from refusals import Command, refused
 from scenes import looking
 
 from stseg.arrays import AnyArray, Bytes, Rows

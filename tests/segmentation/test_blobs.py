@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from checks import drawn, numbers
 from hypothesis import example
 from hypothesis import strategies as st
-from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Floats, Labels, Singles
 from stseg.geometry import Grid

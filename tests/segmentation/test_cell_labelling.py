@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_expansion as reference
+from checks import drawn, numbers
 from hypothesis import strategies as st
-from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.config import MotionConfig, SegmentationConfig, TrackingConfig

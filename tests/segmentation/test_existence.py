@@ -6,10 +6,10 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from checks import drawn
 from hypothesis import strategies as st
 from scenes import room
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
-from strategies import drawn
 
 from stseg.arrays import Floats, Ints
 from stseg.config import Config

@@ -10,21 +10,18 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from cases import cases
+from checks import cases, compiled_only, drawn, numbers, refused
 from hypothesis import strategies as st
 from reference_simulate import extents, hits, shade
-from refusals import refused
 from scipy.spatial.distance import pdist
-from strategies import BARREL, cameras, drawn, numbers
+from strategies import BARREL, cameras
 
+from stseg import Camera, read_recording, read_tracks_csv
 from stseg.arrays import Floats
 from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError, OutputError
-from stseg.geometry import Camera
 from stseg.io.outputs.simulated_scene import write_scene
 from stseg.io.recording.frames import open_frames, read_background
-from stseg.io.recording.rigs import read_recording
-from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import NAMED, Lamp, SceneFilm, SceneSpec
 from stseg.simulation.crowd.social_forces import CrowdFrame, walk_freely
 from stseg.simulation.rendering import ray_casting as draw_module
@@ -151,6 +148,7 @@ def test_rays_meet_what_stands(ground: list[tuple[float, float]], phase: float, 
     np.testing.assert_array_equal(drawing.silhouettes, extents(np.isfinite(depth)))
 
 
+@compiled_only
 def test_shadows_fall_away_from_the_lamp() -> None:
     viewer = viewers(replace(TINY, size=(48, 36)))[0]
     bodies = pose(crowd_of(np.array([[0.2, -0.3], [-0.9, 0.4]])))
@@ -232,6 +230,7 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
     assert 0.8 * spec.people < np.mean(inside) and len(earlier) > spec.people
 
 
+@compiled_only
 def test_regulars_come_back_as_they_were() -> None:
     spec = replace(NAMED["return"], seconds=NAMED["return"].seconds / 2)
     came, heights, before = Counter[int](), set[tuple[int, float]](), set[int]()
@@ -243,6 +242,7 @@ def test_regulars_come_back_as_they_were() -> None:
     assert len(heights) == spec.people
 
 
+@compiled_only
 def test_nobody_leaves_the_closed_room() -> None:
     spec = replace(NAMED["long"], seconds=120.0)
     assert all(len(crowd.truth(spec.area)) == spec.people for crowd in walk_freely(spec))
@@ -410,6 +410,7 @@ def test_command_changes_the_named_scene(tmp_path: Path, capsys: pytest.CaptureF
     assert "2 frames of 1 cameras" in capsys.readouterr().out
 
 
+@compiled_only
 def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     simulate(tmp_path / "s", scene="long", cameras=2, seconds=0.4, size="64,48")
     assert {path.name for path in (tmp_path / "s").iterdir()} == {

@@ -6,13 +6,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from recordings import in_ci
+from checks import in_ci
 
-from stseg import Tracker
-from stseg.arrays import Boxes, Bytes
+from stseg import Boxes, Tracker, evaluate
+from stseg.arrays import Bytes
 from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError
-from stseg.evaluation import evaluate
 from stseg.simulation import NAMED, SceneFilm, Spoil
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 from stseg.simulation.spoiling.spoil import MAX_STRENGTHS, STRENGTHS, spoiled_boxes, spoiled_mask

@@ -9,11 +9,10 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from recordings import data_path
+from checks import data_path
 from scenes import looking, rig_of
 
-from stseg.evaluation import evaluate
-from stseg.io.recording.rigs import read_recording
+from stseg import evaluate, read_recording
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "tools"))

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from checks import compiled_only, refused
 from coloured_people import RIG, follow, frame_of, rows_of
-from recordings import compiled_only
-from refusals import refused
 from scenes import CONFIG, FRAME_RATE, SIZE, found, no_boxes, people
 
 from stseg.arrays import Floats, Observation, Rows

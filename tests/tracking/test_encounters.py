@@ -6,23 +6,18 @@ from itertools import combinations, islice, pairwise
 
 import numpy as np
 import pytest
+from checks import compiled_only, drawn, in_ci, refused
 from hypothesis import strategies as st
-from recordings import compiled_only, in_ci
-from refusals import refused
 from scenes import boxes, found, people, room
-from strategies import drawn
 
-from stseg import Tracker
+from stseg import Config, FrameSet, Grid, Rig, Tracker, evaluate
 from stseg.arrays import Floats, Observation, Rows
-from stseg.config import Config, TrackingConfig
+from stseg.config import TrackingConfig
 from stseg.engine.committed_frames import within_area
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.errors import ConfigError
-from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.geometry import Grid, Rig
-from stseg.io.recording.frames import FrameSet
 from stseg.records.blobs import Blobs
 from stseg.records.sparse_labels import SparseLabels
 from stseg.records.sparse_volume import SparseVolume

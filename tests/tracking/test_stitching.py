@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from checks import drawn
 from hypothesis import strategies as st
 from run_files import trajectory_of
-from strategies import drawn
 
 from stseg.arrays import Rows
 from stseg.config import Config, SegmentConfig, TrackingConfig

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_core as reference
+from checks import drawn, numbers
 from hypothesis import strategies as st
 from scenes import CONFIG, found, people
-from strategies import drawn, numbers
 
 from stseg.arrays import Floats, Ints
 from stseg.baselines.huang_wang_2012.kalman_filters import corrected_filters, initial, innovations, predicted_filters

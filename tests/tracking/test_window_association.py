@@ -5,11 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from checks import drawn, numbers
 from hypothesis import strategies as st
 from run_files import trajectory_of
 from scenes import corner_cameras
 from scipy.optimize import linear_sum_assignment
-from strategies import drawn, numbers
 
 from stseg.arrays import Flags, Rows
 from stseg.bodies.pillars import BodyTable

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from checks import drawn, numbers
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 from simulated_people import BORDER, CONFIG, RATE, committed, gone, rows_of, runs, straight, swapped, visit
-from strategies import drawn, numbers
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig

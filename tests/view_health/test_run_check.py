@@ -6,16 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import compiled_only, data_path, track, write_recording
+from checks import compiled_only, data_path
+from recordings import track, write_recording
 from scenes import detector_of, evidence_of, people, room
 from simulated_people import moved
 
+from stseg import Camera, Recording, Rig, read_recording, read_run, write_rig
 from stseg.arrays import Bytes, Floats
 from stseg.commands.main import main
-from stseg.geometry import Camera, Rig
-from stseg.io.recording.recording import Recording
-from stseg.io.recording.rigs import read_recording, write_rig
-from stseg.io.runfile.runs import read_run
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
 from stseg.simulation.rendering.room import render_room

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from checks import drawn, examples, in_ci
 from hypothesis import strategies as st
-from recordings import in_ci
 from scenes import BODY, detector_of, evidence_of, expecting, likelihoods, looking, no_boxes, people, rig_of, room
-from strategies import drawn, examples
 
 from stseg import Tracker
 from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence

@@ -8,9 +8,8 @@ import detector_models
 import numpy as np
 import onnx
 import pytest
+from checks import data_path, refused
 from detector_models import HEIGHT, MODELS, WIDTH
-from recordings import data_path
-from refusals import refused
 
 from stseg.errors import FormatError, InputError, SourceError
 from stseg.io.detectors.hog import HogDetector, window_margins
