@@ -29,18 +29,7 @@ def test_unusual_names_work(name: str) -> None:
     assert parse_rig(RIG.replace('"cam1"', json.dumps(name)), Path("rig.toml")).rig.cameras[0].name == name
 
 
-def test_a_foreign_folder_is_left_alone(tmp_path: Path, refusal: Command) -> None:
-    rig, folder = write_rig(tmp_path), tmp_path / "q.h5.segments"
-    folder.mkdir()
-    names = ("thesis.txt", "begun.json", "segment-00000.h5")
-    for name in names:
-        (folder / name).write_text("precious")
-    for more in ((), ("--frames", "5:3"), ("--overwrite",)):
-        assert "did not make" in refusal("run", rig, "-o", tmp_path / "q.h5", *more)
-    assert {path.name: path.read_text() for path in folder.iterdir()} == dict.fromkeys(names, "precious")
-
-
-def test_foreign_folders_that_are_called_removed_stay(tmp_path: Path) -> None:
+def test_foreign_files_and_folders_called_removed_stay(tmp_path: Path) -> None:
     for number, names in enumerate((("begun.json",), ("begun.json", "stseg-work-folder", "thesis.txt"))):
         folder = tmp_path / f"q.h5.segments.{number:016x}.removed"
         folder.mkdir()
@@ -49,17 +38,6 @@ def test_foreign_folders_that_are_called_removed_stay(tmp_path: Path) -> None:
     before = sorted(tmp_path.rglob("*"))
     WorkFolder(tmp_path / "q.h5", {}).require_output(False, NO_INPUTS)
     assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_a_work_folder_that_is_a_link_is_refused(tmp_path: Path, refusal: Command) -> None:
-    (tmp_path / "else").mkdir()
-    with WorkFolder(tmp_path / "else" / "q.h5", {}) as work:
-        (tmp_path / "q.h5.segments").symlink_to(work.path)
-        refusal("run", write_rig(tmp_path), "-o", tmp_path / "q.h5")
-        assert work.begun
-
-
-def test_our_folder_keeps_files_that_are_not_ours(tmp_path: Path) -> None:
     with WorkFolder(tmp_path / "q.h5", {}) as work:
         (work.path / "thesis.txt").write_text("precious")
         work.remove()
@@ -68,6 +46,22 @@ def test_our_folder_keeps_files_that_are_not_ours(tmp_path: Path) -> None:
         (work.path / "thesis.txt").unlink()
         work.remove()
     assert not (tmp_path / "q.h5.segments").exists()
+
+
+def test_foreign_folders_and_links_are_left_alone(tmp_path: Path, refusal: Command) -> None:
+    (tmp_path / "else").mkdir()
+    with WorkFolder(tmp_path / "else" / "q.h5", {}) as work:
+        (tmp_path / "r.h5.segments").symlink_to(work.path)
+        refusal("run", write_rig(tmp_path), "-o", tmp_path / "r.h5")
+        assert work.begun
+    rig, folder = write_rig(tmp_path), tmp_path / "q.h5.segments"
+    folder.mkdir()
+    names = ("thesis.txt", "begun.json", "segment-00000.h5")
+    for name in names:
+        (folder / name).write_text("precious")
+    for more in ((), ("--frames", "5:3"), ("--overwrite",)):
+        assert "did not make" in refusal("run", rig, "-o", tmp_path / "q.h5", *more)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == dict.fromkeys(names, "precious")
 
 
 def test_links_and_files_beside_an_output_are_not_written_to(run_path: Path) -> None:
@@ -106,11 +100,16 @@ def test_a_limit_of_file_sizes_is_one_line(run_path: Path, to: str) -> None:
 SIZE = (64, 48)
 
 
-def test_a_name_of_a_million_digits_is_numbered_in_time() -> None:
+def test_a_million_digits_and_large_masks_take_no_time(tmp_path: Path) -> None:
     begun = time.monotonic()
     numbers = last_numbers(["a" + "9" * 1_000_000, "7" * 1_000_000 + "b"])
     assert numbers is not None and numbers.tolist() == [10**15 - 1, 777_777_777_777_777]
     assert time.monotonic() - begun < REFUSAL_TIME
+    masks = [{"image_id": 0, "segmentation": {"size": [8000, 8000], "counts": [9, 63_999_991]}}] * 10_000
+    (tmp_path / "r.json").write_text(json.dumps(masks))
+    read_source(Source("boxes", tmp_path / "r.json"), SIZE)
+    assert time.monotonic() - begun < REFUSAL_TIME
+    assert run_lengths([8000, 8000], [9, 63_999_991]).box() == (0.0, 0.0, 8000.0, 8000.0)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -122,15 +121,6 @@ def test_the_box_of_run_lengths_is_that_of_the_mask(seed: int) -> None:
     expected = (u.min(), v.min(), np.ptp(u) + 1, np.ptp(v) + 1) if len(u) else (0, 0, 0, 0)
     np.testing.assert_array_equal(own.draw((7, 9)), mask)
     assert own.box() == expected
-
-
-def test_boxes_of_large_masks_take_no_images(tmp_path: Path) -> None:
-    masks = [{"image_id": 0, "segmentation": {"size": [8000, 8000], "counts": [9, 63_999_991]}}] * 10_000
-    (tmp_path / "r.json").write_text(json.dumps(masks))
-    begun = time.monotonic()
-    read_source(Source("boxes", tmp_path / "r.json"), SIZE)
-    assert time.monotonic() - begun < REFUSAL_TIME
-    assert run_lengths([8000, 8000], [9, 63_999_991]).box() == (0.0, 0.0, 8000.0, 8000.0)
 
 
 def test_a_parquet_file_of_many_rows_or_another_type_is_refused(tmp_path: Path) -> None:

@@ -53,15 +53,12 @@ def test_a_row_far_behind_all_others_costs_nothing(tmp_path: Path) -> None:
     assert sum(segment.stop - segment.first for segment in job.segments()) == 604 + 1201 + 601
 
 
-def test_a_polygon_of_a_thousand_corners_works(tmp_path: Path) -> None:
+def test_a_thousand_corners_and_a_superscript_work(tmp_path: Path) -> None:
     turn = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
     corners = np.stack([1.5 * np.cos(turn), 1.5 * np.sin(turn)], -1).tolist()
     grid = read_recording(write_rig(tmp_path, "[grid]", f"polygon = {corners}\n[grid]")).rig.grid
     near = np.hypot(*np.moveaxis(grid.ground, -1, 0)) < 1.5
     np.testing.assert_array_equal(grid.inside(), near)
-
-
-def test_a_file_with_a_superscript_in_its_name_is_ordered(tmp_path: Path) -> None:
     rig = write_rig(tmp_path, 'kind = "boxes", path = "boxes.csv"', 'kind = "video", path = "a*.avi"')
     for name in ("a1²2.avi", "a10²2.avi", "a9²2.avi"):
         (tmp_path / name).write_bytes(b"\0")
@@ -81,13 +78,6 @@ def test_numpy_headers_are_not_believed(header: str) -> None:
     refused(ValueError, "header", parse_npy, data)
 
 
-def test_a_small_archive_that_unpacks_to_gigabytes_is_refused(tmp_path: Path, refusal: Command) -> None:
-    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("a.npy", bytes(200_000_000))
-    options = ("-o", tmp_path / "r.toml", *SCENE, "--size=64,48", "--names=a")
-    assert "unpacked" in refusal("calibrate", "import", "matrix", tmp_path / "a.npz", *options)
-
-
 NAMES = ["2026-01-01T10:30:00.avi", "http:127.0.0.1:9701", "concat:a", "-", "a%03d.avi"]
 NAMES += [os.fsdecode(b"\xff\xfe.avi")] if sys.platform == "linux" else []
 
@@ -99,11 +89,15 @@ def test_any_name_of_a_file_is_a_file(tmp_path: Path, monkeypatch: pytest.Monkey
     assert read_video_size(Path(name)) == (64, 48)
 
 
-def test_pipes_are_not_waited_for(tmp_path: Path, refusal: Command) -> None:
+def test_pipes_and_archives_of_gigabytes_are_refused(tmp_path: Path, refusal: Command) -> None:
     rig = write_rig(tmp_path)
     (tmp_path / "boxes.csv").unlink()
     os.mkfifo(tmp_path / "boxes.csv")
     refusal("run", rig, "-o", tmp_path / "q.h5")
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.npy", bytes(200_000_000))
+    options = ("-o", tmp_path / "r.toml", *SCENE, "--size=64,48", "--names=a")
+    assert "unpacked" in refusal("calibrate", "import", "matrix", tmp_path / "a.npz", *options)
 
 
 @pytest.mark.parametrize("given", [None, "protocol_whitelist;rtsp"])
@@ -150,20 +144,15 @@ def test_damaged_pictures_are_answered_in_one_line(
         assert status in (0, 2) and printed.count("\n") == (status == 2), printed
 
 
-def test_a_png_chunk_longer_than_its_file_is_not_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """OpenCV would take two gigabytes for it."""
-    data = bytearray(cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
-    start = data.index(b"IDAT") - 4
-    data[start : start + 4] = b"\x7f\xff\xff\xff"
-    (tmp_path / "a.png").write_bytes(data)
-    monkeypatch.setattr(cv2, "imdecode", Mock(side_effect=AssertionError("it was decoded")))
-    refused(SourceError, "a broken file", read_picture, tmp_path / "a.png", "images", (64, 48), "")
-
-
-def test_a_packet_that_declares_a_huge_picture_is_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_chunks_and_huge_pictures_are_not_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     packet = bytearray(cv2.imencode(".jpg", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
     start = packet.index(b"\xff\xc0") + 5
     assert PictureHeads().fits(np.frombuffer(packet, np.uint8))
     packet[start : start + 4] = (16000).to_bytes(2, "big") + (65500).to_bytes(2, "big")
     monkeypatch.setattr(cv2, "imdecode", Mock(side_effect=AssertionError("it was decoded")))
     assert not PictureHeads().fits(np.frombuffer(packet, np.uint8))
+    data = bytearray(cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
+    start = data.index(b"IDAT") - 4
+    data[start : start + 4] = b"\x7f\xff\xff\xff"  # OpenCV would take two gigabytes for it
+    (tmp_path / "a.png").write_bytes(data)
+    refused(SourceError, "a broken file", read_picture, tmp_path / "a.png", "images", (64, 48), "")

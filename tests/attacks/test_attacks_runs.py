@@ -90,16 +90,13 @@ def test_a_text_of_2_gib_takes_no_such_memory(run_path: Path, refusal: Command) 
     assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
-def test_heaps_are_found_astride_of_blocks(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_heaps_are_found_and_files_examined_when_changed(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     contents = run_path.read_bytes()
     expected = [place for place in range(len(contents)) if contents.startswith(b"GCOL\x01\0\0\0", place)]
     for block in (9, 100, 901):
         monkeypatch.setattr(safe_hdf5, "_BLOCK", block)
         with run_path.open("rb") as file:
             assert list(safe_hdf5._collections(file)) == expected
-
-
-def test_a_file_is_examined_once_and_again_when_it_has_changed(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     examined: list[h5py.File] = []
     monkeypatch.setattr(safe_hdf5, "_require_own", examined.append)
     for _ in range(3):

@@ -72,14 +72,13 @@ def test_python_starts_no_process_that_does(folder: Path) -> None:
     assert (folder / "python.h5").exists()
 
 
-def test_an_empty_place_of_modules_is_left_out(folder: Path) -> None:
+def test_planted_modules_would_run_but_for_what_is_left_out(folder: Path) -> None:
     late = "import sys\nfrom stseg.commands import main\nsys.path.insert(0, '')\nmain.command()"
     assert call(folder, late, "inspect", "rig.toml").returncode == 0
-
-
-def test_numba_takes_no_configuration_from_the_current_folder(folder: Path) -> None:
     found = call(folder, "from stseg.kernels import accelerate\nprint(accelerate.numba.config.DISABLE_JIT)\n")
     assert found.stdout.strip() == ("0" if "NUMBA_DISABLE_JIT" not in ENVIRONMENT else "1"), found.stderr
+    subprocess.run([sys.executable, "-c", "import html"], env=ENVIRONMENT, cwd=folder, capture_output=True, check=False)
+    assert "html" in (folder.parent / "ran").read_text()
 
 
 @pytest.mark.slow
@@ -95,8 +94,3 @@ def test_following_runs_nothing_of_the_folder_of_the_recording(tmp_path: Path) -
     succeeds(folder, "run", rig.name, "-o", "run.h5", "--follow", "--frames", "0:12", *sets)
     for words in tables(Path(__file__).with_suffix(".toml"))["with_videos"]:
         succeeds(folder, *words.split())
-
-
-def test_the_planted_modules_would_run(folder: Path) -> None:
-    subprocess.run([sys.executable, "-c", "import html"], env=ENVIRONMENT, cwd=folder, capture_output=True, check=False)
-    assert "html" in (folder.parent / "ran").read_text()

@@ -27,15 +27,11 @@ def test_mutated_files_are_answered(target: Target, seeds: tuple[int, int]) -> N
 
 
 @drawn(200, st.text(max_size=40))
-def test_numbers_are_those_of_python_or_none(text: str) -> None:
+def test_numbers_are_pythons_and_names_are_printable(text: str) -> None:
     number = parse_number(text)
     assert number != number or number == float(text)
     whole = parse_whole(text, -100, 100)
     assert whole is None or whole == int(text)
-
-
-@drawn(200, st.text(max_size=40))
-def test_names_and_errors_are_printable(text: str) -> None:
     assert printable(text).isprintable() and abbreviated(text).isprintable()
     assert not is_name(text) or Path(text).name == text
 

@@ -215,14 +215,14 @@ class TestPom:
         path.write_text("\n".join(lines))
         return path
 
-    def test_two_planes_make_a_camera(self, tmp_path: Path) -> None:
+    def test_two_planes_make_a_camera_and_mirrors_are_named(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
         (foreign,) = read_pom([self.files(tmp_path, 2)], SIZE, self.head / self.cell)
         camera = World(str(self.cell), mirrored=True).camera(foreign, "c", SIZE)
         pixel, ahead = camera.project(GROUND, HEIGHTS)
         assert ahead.all()
         np.testing.assert_allclose(pixel, expected(2, np.zeros(5)), rtol=0, atol=1e-6)
-
-    def test_by_command_a_mirrored_grid_is_named(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         files = [self.files(tmp_path, turn).name for turn in (0, 2)]
         scene = ("--size=640,480", "--unit=0.25", "--up=+z", "-o=r.toml")
         refused(CalibrationError, r"handedness: found a mirrored world.*--mirrored", run, "pom", *files, *scene)
@@ -288,19 +288,17 @@ def run(*tokens: str, area: str = "--area=-1.5,-1.5,1.5,1.5") -> None:
 
 
 class TestCommand:
-    def test_nothing_but_the_file(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    @cases()
+    def test_says_what_to_mend(self, tmp_path: Path, option: str, complaint: str) -> None:
+        pose_toml(tmp_path / "c.toml", "cam_")
+        refused(InputError, complaint, run, "caliscope", "c.toml", "-o=r.toml", option)
+
+    def test_a_size_alone_is_asked_for(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        pose_toml(tmp_path / "c.toml", "cam_", size=False)
+        refused(ConfigError, r"--size: found nothing, .*c.toml does not say it", run, "pose2sim", "c.toml", "-o=r.toml")
         pose_toml(tmp_path / "c.toml", "cam_")
         run("anipose", "c.toml", "-o=r.toml")
         cameras: tuple[Camera, ...] = read_recording("r.toml").rig.cameras
         assert [camera.name for camera in cameras] == ["view0", "view1", "view2"]
         np.testing.assert_allclose(cameras[1].project(GROUND, HEIGHTS)[0], expected(1, DISTORTION), rtol=0, atol=1e-6)
         assert "calibrated in cm (guessed: --unit), +z up (guessed: --up)" in capsys.readouterr().out
-
-    @cases()
-    def test_says_what_to_mend(self, tmp_path: Path, option: str, complaint: str) -> None:
-        pose_toml(tmp_path / "c.toml", "cam_")
-        refused(InputError, complaint, run, "caliscope", "c.toml", "-o=r.toml", option)
-
-    def test_a_size_is_asked_for(self, tmp_path: Path) -> None:
-        pose_toml(tmp_path / "c.toml", "cam_", size=False)
-        refused(ConfigError, r"--size: found nothing, .*c.toml does not say it", run, "pose2sim", "c.toml", "-o=r.toml")

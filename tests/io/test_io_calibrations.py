@@ -246,12 +246,6 @@ class TestCommand:
         world = "calibrated in mm (given), -z up (given)"
         assert printed == [world, line, line.replace("left", "right"), "wrote room.toml"]
 
-    def test_options_may_stand_apart_from_their_values(self, calibrations: list[str]) -> None:
-        apart = [word for option in (*SCENE, *SOURCE) for word in option.split("=")]
-        tokens = ["import", "opencv", *calibrations, *apart, "-o", "room.toml"]
-        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
-        assert read_recording("room.toml").rig.grid.x == (-1.0, 1.0)
-
     def test_pairs_names_sources_polygon(self, calibrations: list[str]) -> None:
         Path("in.xml").write_text(xml(camera_matrix=MATRIX, distortion_coefficients=np.zeros(5)))
         Path("ex.xml").write_text(xml(rvec=ROTATION, tvec=TRANSLATION))
@@ -267,27 +261,13 @@ class TestCommand:
         assert recording.sources[1].source.first_frame == 1 and recording.sources[1].source.least_score == 0.3
         assert recording.sources[1].source.appearance == Path("b.npy")
 
-    def test_matrices(self, calibrations: list[str]) -> None:
+    def test_matrices_and_which_files(self, calibrations: list[str]) -> None:
         np.savetxt("p.txt", matrix_of(MATRIX, ROTATION, TRANSLATION), fmt="%.17g")
         calibrate("matrix", "p.txt", *SCENE, *SOURCE, "-o=matrix.toml")
         calibrate("opencv", calibrations[0], *SCENE, *SOURCE, "-o=opencv.toml")
         by_matrix, by_opencv = (read_recording(f"{name}.toml").rig.cameras[0] for name in ("matrix", "opencv"))
         np.testing.assert_allclose(by_matrix.projection, by_opencv.projection, rtol=1e-12, atol=1e-9)
         assert by_matrix.name == "p"
-
-    def test_an_own_rig_is_replaced(self, calibrations: list[str]) -> None:
-        tokens = ("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml")
-        calibrate(*tokens)
-        calibrate(*tokens, "--overwrite")
-        assert len(read_recording("room.toml").rig.cameras) == 2
-
-    @cases()
-    def test_says_what_to_mend(self, calibrations: list[str], tokens: str, kind: str, complaint: str) -> None:
-        options = (*SCENE, *SOURCE, "-o=room.toml", *tokens.split())
-        refused(getattr(errors, kind), complaint, calibrate, "opencv", *calibrations, *options)
-        assert not Path("room.toml").exists()
-
-    def test_which_files(self, calibrations: list[str]) -> None:
         options = (*SCENE, *SOURCE, "-o=room.toml")
         refused(ConfigError, r"found nothing, expected one calibration a camera", calibrate, "opencv", *options)
         refused(CycloptsError, r"--up", calibrate, "opencv", calibrations[0], *options, "--up=w")
@@ -296,6 +276,24 @@ class TestCommand:
         Path("left/left/config.xml").write_text(whole())
         files = (calibrations[0], "left/left/config.xml")
         refused(ConfigError, r"--names: found files and folders that share", calibrate, "opencv", *files, *options)
+
+    def test_an_own_rig_is_replaced(self, calibrations: list[str]) -> None:
+        tokens = ("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml")
+        calibrate(*tokens)
+        calibrate(*tokens, "--overwrite")
+        assert len(read_recording("room.toml").rig.cameras) == 2
+
+    def test_options_may_stand_apart_from_their_values(self, calibrations: list[str]) -> None:
+        apart = [word for option in (*SCENE, *SOURCE) for word in option.split("=")]
+        tokens = ["import", "opencv", *calibrations, *apart, "-o", "room.toml"]
+        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        assert read_recording("room.toml").rig.grid.x == (-1.0, 1.0)
+
+    @cases()
+    def test_says_what_to_mend(self, calibrations: list[str], tokens: str, kind: str, complaint: str) -> None:
+        options = (*SCENE, *SOURCE, "-o=room.toml", *tokens.split())
+        refused(getattr(errors, kind), complaint, calibrate, "opencv", *calibrations, *options)
+        assert not Path("room.toml").exists()
 
     def test_a_camera_below_ground_is_told(self, calibrations: list[str], capsys: pytest.CaptureFixture[str]) -> None:
         calibrate("opencv", calibrations[0], *SCENE, *SOURCE, "-o=r.toml", "--up=+z", "--area=-1,-3,1,-0.5")

@@ -66,14 +66,11 @@ def test_lost_frames_are_named_and_time_goes_on(suffix: str, tmp_path: Path) -> 
     assert np.abs(whole.astype(int) - late).mean() < 2
 
 
-def test_lost_frames_are_a_warning_of_the_run(tmp_path: Path) -> None:
+def test_a_run_warns_of_lost_frames_and_refuses_one_file_twice(tmp_path: Path) -> None:
     shown = np.array([0, 1, -1, 3, -1, -1, -1, 7])
     recording = with_alignment(small_recording(tmp_path), [shown, None])
     run = read_run(write_small_run(tmp_path / "run.h5", recording=recording))
     assert [one for one in run.warnings if "image" in one] == ["left: no image of frames 4 to 6: lost or damaged?"]
-
-
-def test_one_file_of_two_cameras_is_refused(tmp_path: Path) -> None:
     video = CameraSource(Source("video", write_at_rate(tmp_path / "a.avi", pictures()[:3])))
     twins = blank_recording(video, video, size=SIZE)
     refused(SourceError, "a.avi: camera cam2: found the source of camera cam1 too", index_streams, twins)

@@ -30,14 +30,6 @@ def read(folder: Path, text: str, first_frame: int = 0, frames: int | None = Non
     return read_boxes(path, first_frame, frames)
 
 
-def test_csv_columns_come_in_any_order_and_others_are_ignored(tmp_path: Path) -> None:
-    text = 'label,height,width,top,left,score,frame\n"a, b",4,3,2,1,0.5,0\n,40,30,20,10,1,2\n'
-    table = read(tmp_path, text)
-    assert table.frames == 3 and table.at(0).pixel.tolist() == [[1, 2, 3, 4]]
-    assert table.at(0).score.tolist() == [0.5] and table.at(1).pixel.shape == (0, 4)
-    assert table.at(2).pixel.tolist() == [[10, 20, 30, 40]]
-
-
 @pytest.mark.parametrize("text", ["\ufeffframe, left, top, width, height\n0, 1, 2, 3, 4\n", "0,7,1,2,3,4\n"])
 def test_boxes_without_scores_are_believed(tmp_path: Path, text: str) -> None:
     assert read(tmp_path, text).at(0).score.tolist() == [1]
@@ -52,24 +44,23 @@ def test_motchallenge_lines(tmp_path: Path, separator: str) -> None:
     assert table.at(1).score.tolist() == [0.25]
 
 
-def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
-    assert read(tmp_path, "0 -1 1 2 3 4 1\n", frames=5).frames == 5
-    assert len(read(tmp_path, "", frames=5).at(4)) == 0
-    assert len(read(tmp_path, "frame,left,top,width,height\n", frames=5).at(0)) == 0
-
-
 @cases((f"{'9' * 5000},1,2,3,4,1", "line 3: found frame"))
 def test_bad_lines_are_named(tmp_path: Path, line: str, reported: str) -> None:
     text = f"frame,left,top,width,height,score\n0,1,2,3,4,1\n{line}\n0,1,2,3,4,1\n"
     refused(FormatError, reported, read, tmp_path, text)
 
 
-def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
+def test_columns_come_in_any_order_and_files_that_are_none(tmp_path: Path) -> None:
     refused(SourceError, "found no boxes", read, tmp_path, "")
     refused(SourceError, "No such file", read_boxes, tmp_path / "none.csv")
     refused(SourceError, "expected a file of boxes", read_boxes, tmp_path)
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00\x80")
     refused(FormatError, "text file in UTF-8", read_boxes, tmp_path / "binary")
+    text = 'label,height,width,top,left,score,frame\n"a, b",4,3,2,1,0.5,0\n,40,30,20,10,1,2\n'
+    table = read(tmp_path, text)
+    assert table.frames == 3 and table.at(0).pixel.tolist() == [[1, 2, 3, 4]]
+    assert table.at(0).score.tolist() == [0.5] and table.at(1).pixel.shape == (0, 4)
+    assert table.at(2).pixel.tolist() == [[10, 20, 30, 40]]
 
 
 @drawn(30, st.lists(st.tuples(st.integers(3, 9), *[st.floats(0, 1e4) for _ in range(4)], st.floats(0, 1)), min_size=1))
@@ -121,14 +112,6 @@ def coco_results(folder: Path) -> tuple[Path, list[Bytes]]:
     ]  # fmt: skip
     (folder / "results.json").write_text(json.dumps(rows))
     return folder / "results.json", masks
-
-
-def test_results_of_pycocotools_are_read(tmp_path: Path) -> None:
-    path, masks = coco_results(tmp_path)
-    found = read_source(Source("instances", path), SIZE)
-    assert (found.format, found.frames, found.kept.score.tolist()) == ("COCO results", 3, [0.5, 0.6, 0.7])
-    for frame, mask in enumerate(masks):
-        np.testing.assert_array_equal(instance_image(found.kept, [frame], SIZE), mask)
 
 
 @pytest.mark.filterwarnings("ignore:Operation with tuple")  # of pandas, by motmetrics
@@ -207,16 +190,13 @@ def test_malformed_parquet_is_one_line(tmp_path: Path, column: str, values: list
     assert "\n" not in refused(InputError, message, read_source, Source("boxes", tmp_path / "b.parquet"), SIZE)
 
 
-def test_classes_and_scores_choose(tmp_path: Path) -> None:
+def test_classes_flags_and_scores_choose(tmp_path: Path) -> None:
     made = sample(tmp_path, "Ultralytics text")
     assert read_source(Source("boxes", made.path, 1), SIZE).read.classes() == {"person": 3, "car": 2}
     assert len(read_source(Source("boxes", made.path, 1, classes=("car",)), SIZE).kept) == 2
     assert len(read_source(Source("boxes", made.path, 1, least_score=0.6), SIZE).kept) == 3
     said = r"no detections of persn; classes are person \(3\), car \(2\)"
     refused(SourceError, said, read_source, Source("boxes", made.path, 1, classes=("persn",)), SIZE)
-
-
-def test_ground_truth_of_motchallenge_keeps_its_flag_and_classes(tmp_path: Path) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1,1,10,12,20,30,1,1,0.8\n1,2,1,1,5,5,0,1,1\n3,1,5,6,10,24,1,3,1\n")
     found = read_source(Source("boxes", path, 1), SIZE)
@@ -224,12 +204,17 @@ def test_ground_truth_of_motchallenge_keeps_its_flag_and_classes(tmp_path: Path)
     assert len(read_source(Source("boxes", path, 1, classes=("pedestrian",)), SIZE).kept) == 1
 
 
-def test_track_ids_are_no_scores_and_keypoints_no_outlines(tmp_path: Path) -> None:
+def test_results_of_pycocotools_without_scores_and_outlines(tmp_path: Path) -> None:
     (tmp_path / "v_0.txt").write_text("0 0.5 0.5 0.1 0.2 1\n0 0.2 0.5 0.1 0.2 2\n")
     assert read_source(Source("boxes", tmp_path), SIZE).kept.score.tolist() == [1, 1]
     (tmp_path / "v_0.txt").write_text(f"0 0.5 0.5 0.1 0.2 {'0.3 0.4 0.9 ' * 17} 0.75\n")
     found = read_source(Source("boxes", tmp_path), SIZE)
     assert found.kept.score.tolist() == [0.75] and not found.kept.mask
+    path, masks = coco_results(tmp_path)
+    found = read_source(Source("instances", path), SIZE)
+    assert (found.format, found.frames, found.kept.score.tolist()) == ("COCO results", 3, [0.5, 0.6, 0.7])
+    for frame, mask in enumerate(masks):
+        np.testing.assert_array_equal(instance_image(found.kept, [frame], SIZE), mask)
 
 
 def test_run_lengths_are_cocos() -> None:
@@ -256,15 +241,15 @@ def test_masks_become_instances(tmp_path: Path) -> None:
     assert end is None
 
 
-def test_images_at_equal_steps_are_consecutive_frames() -> None:
+def test_frames_are_counted_as_said_and_wrong_keys_named(tmp_path: Path) -> None:
     assert listed_frames(Path("a"), ["a_10.png", "a_20.png", "a_0.png"])[0].tolist() == [1, 2, 0]
     numbers, count = listed_frames(Path("a"), ["a_10.png", "a_20.png", "a_90.png"])
     assert numbers.tolist() == [10, 20, 90] and count is None
     frames, count = listed_frames(Path("a"), ["x", "y"])
     assert frames.tolist() == [0, 1] and count == 2
-
-
-def test_the_rig_names_a_wrong_key(tmp_path: Path) -> None:
+    assert read(tmp_path, "0 -1 1 2 3 4 1\n", frames=5).frames == 5
+    assert len(read(tmp_path, "", frames=5).at(4)) == 0
+    assert len(read(tmp_path, "frame,left,top,width,height\n", frames=5).at(0)) == 0
     old, new = '"boxes.csv" }', '"x.json", SOURCE }\nimages = { kind = "video", path = "x.mp4" }'
     keys = 'classes = ["person"], score = 0.3, columns = { frame = "t" }'
     path = write_rig(tmp_path, old, new.replace("SOURCE", keys))

@@ -67,7 +67,6 @@ def empty_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A file that is not there yet."""
     return tmp_path / "tracks.out"
 
 
@@ -136,7 +135,7 @@ def test_a_library_that_is_missing_is_asked_for_in_one_line(
     refused(ConfigError, "Python: nowhere: found no such library", load_extra, "nowhere.at_all", "parquet")
 
 
-def test_parquet_holds_all_columns_and_their_units(run: Run, path: Path) -> None:
+def test_parquet_and_napari_hold_columns_and_rows_in_order(run: Run, path: Path) -> None:
     FORMATS["parquet"].write(path, run)
     table = pyarrow.parquet.read_table(path)
     assert table.column_names == [*(TRAJECTORY.names or ()), "time"]
@@ -147,9 +146,6 @@ def test_parquet_holds_all_columns_and_their_units(run: Run, path: Path) -> None
     assert table.schema.field("x").metadata == {b"units": b"m"}
     about = json.loads(table.schema.metadata[b"stseg"])
     assert about == {"scene": "hall", "frame_rate": 5.0, "cameras": ["left", "right"]}
-
-
-def test_napari_tracks_are_sorted_by_particle_then_frame(run: Run, path: Path) -> None:
     FORMATS["napari"].write(path, run)
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -169,12 +165,9 @@ def same_for_pedpy(data: pedpy.TrajectoryData) -> None:
         np.testing.assert_allclose(found[name], expected[name], atol=1e-4)
 
 
-def test_pedpy_reads_its_text(run: Run, path: Path) -> None:
+def test_pedpy_reads_its_text_and_jupedsim_s_database(run: Run, path: Path) -> None:
     FORMATS["pedpy"].write(path.with_suffix(".txt"), run)
     same_for_pedpy(pedpy.load_trajectory(trajectory_file=path.with_suffix(".txt")))
-
-
-def test_pedpy_reads_jupedsim_s_database_with_the_area(run: Run, path: Path) -> None:
     path.write_text("left behind by a run that was killed")
     FORMATS["jupedsim"].write(path, run)
     same_for_pedpy(pedpy.load_trajectory_from_jupedsim_sqlite(trajectory_file=path))
@@ -195,10 +188,12 @@ def test_jupedsim_replays_its_database(run: Run, path: Path) -> None:
     assert shown == here[["id", "x", "y"]].tolist()
 
 
-def test_people_look_where_they_go() -> None:
+def test_people_look_where_they_go_and_stay_in_the_grid() -> None:
     table = trajectory_of((0, 1, 0, 0), (0, 2, 7, 7), (1, 1, 0, 4), (1, 3, 9, 9), (2, 1, 3, 4))
     np.testing.assert_allclose(headings(table), [(0, 1), (1, 0), (0.6, 0.8), (1, 0), (1, 0)])
     assert headings(table[:0]).shape == (0, 2)
+    rows = trajectory_of((0, 1, -3.2, -9.4), (0, 2, 9.0, 27.0))
+    assert wildtrack_positions(rows, WILDTRACK).tolist() == [0, 480 * 1440 - 1]
 
 
 def test_mot_boxes_are_one_file_a_camera_that_reads_as_boxes(run: Run, path: Path) -> None:
@@ -241,7 +236,7 @@ def wildtrack_files(path: Path) -> tuple[dict[str, Any], dict[int, list[dict[str
         return json.loads(archive.read(grid)), people
 
 
-def test_wildtrack_has_a_file_a_frame_and_says_its_grid(run: Run, path: Path) -> None:
+def test_wildtrack_has_its_grid_and_members_of_its_own_files(run: Run, path: Path) -> None:
     FORMATS["wildtrack"].write(path, run)
     grid, people = wildtrack_files(path)
     assert grid == {"x": 0, "y": 0, "step": 0.025, "columns": 24, "rows": 16}
@@ -257,6 +252,10 @@ def test_wildtrack_has_a_file_a_frame_and_says_its_grid(run: Run, path: Path) ->
         position = person["positionID"]
         assert abs(0.025 * (position % 24) - row["x"]) <= 0.0126
         assert abs(0.025 * (position // 24) - row["y"]) <= 0.0126
+    theirs = min(data_path("wildtrack/annotations_positions").glob("*.json"))
+    ((person, *_), *_), (one, *_) = people.values(), json.loads(theirs.read_text("utf-8"))
+    assert set(person) == set(one) and set(person["views"][0]) == set(one["views"][0])
+    assert {type(value) for value in person["views"][0].values()} == {int}
 
 
 @drawn(100, position=st.integers(0, 480 * 1440 - 1))
@@ -266,20 +265,7 @@ def test_over_wildtrack_s_area_the_grid_is_its_own(position: int) -> None:
     assert wildtrack_positions(row, WILDTRACK).tolist() == [position]
 
 
-def test_places_beyond_wildtrack_s_grid_are_at_its_edge() -> None:
-    rows = trajectory_of((0, 1, -3.2, -9.4), (0, 2, 9.0, 27.0))
-    assert wildtrack_positions(rows, WILDTRACK).tolist() == [0, 480 * 1440 - 1]
-
-
-def test_wildtrack_s_own_files_have_the_same_members(run: Run, path: Path) -> None:
-    theirs = min(data_path("wildtrack/annotations_positions").glob("*.json"))
-    FORMATS["wildtrack"].write(path, run)
-    ((person, *_), *_), (one, *_) = wildtrack_files(path)[1].values(), json.loads(theirs.read_text("utf-8"))
-    assert set(person) == set(one) and set(person["views"][0]) == set(one["views"][0])
-    assert {type(value) for value in person["views"][0].values()} == {int}
-
-
-def test_movement_s_poses_in_xarray(run: Run, path: Path) -> None:
+def test_movement_s_poses_and_boxes_in_xarray(run: Run, path: Path) -> None:
     FORMATS["movement"].write(path, run)
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert data.position.dims == ("time", "space", "keypoint", "individual")
@@ -292,9 +278,6 @@ def test_movement_s_poses_in_xarray(run: Run, path: Path) -> None:
         assert np.isnan(ground[:3]).all()
         np.testing.assert_allclose(ground[3:], [(0.3, 0.2)] * 3)
         np.testing.assert_allclose(data.confidence.sel(individual="id_1"), 1 / (1 + np.exp(-4.0)), rtol=1e-6)
-
-
-def test_movement_s_boxes_in_xarray(run: Run, path: Path) -> None:
     FORMATS["movement-boxes"].write(path, run)
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert data.position.dims == data["shape"].dims == ("view", "time", "space", "individual")
@@ -330,7 +313,16 @@ def test_movingpandas_reads_moving_features(run: Run, path: Path) -> None:
     np.testing.assert_allclose(seconds, FRAMES[3:] / 5)
 
 
-def test_moving_features_say_what_they_are_by(run: Run, path: Path) -> None:
+def test_features_are_those_of_geopandas_and_of_ogc(run: Run, path: Path) -> None:
+    FORMATS["geojson"].write(path.with_suffix(".geojsonl"), run)
+    features = [json.loads(line) for line in path.with_suffix(".geojsonl").read_text("utf-8").splitlines()]
+    shapes = [shapely.geometry.shape(feature["geometry"]) for feature in features]
+    assert [(shape.geom_type, len(shape.coords)) for shape in shapes] == [("LineString", 6), ("LineString", 3)]
+    assert features[1]["properties"] == {
+        "id": 2, "height": 1.7, "score": 4.0, "first": 13, "last": 15, "start": 2.6, "duration": 0.4
+    }  # fmt: skip
+    frame = geopandas.read_file(path.with_suffix(".geojsonl"), driver="GeoJSONSeq")
+    assert frame["id"].tolist() == [1, 2]
     FORMATS["mf-json"].write(path, run)
     text = json.loads(path.read_text("utf-8"))
     assert text["type"] == "FeatureCollection"
@@ -342,18 +334,6 @@ def test_moving_features_say_what_they_are_by(run: Run, path: Path) -> None:
     assert first["time"] == ["1970-01-01T00:00:02.000Z", "1970-01-01T00:00:03.000Z"]
     lengths = {len(first["temporalGeometry"][name]) for name in ("datetimes", "coordinates")}
     assert lengths == {len(first["temporalProperties"][0]["score"]["values"])} == {6}
-
-
-def test_geojson_lines_are_features_of_geopandas(run: Run, path: Path) -> None:
-    FORMATS["geojson"].write(path.with_suffix(".geojsonl"), run)
-    features = [json.loads(line) for line in path.with_suffix(".geojsonl").read_text("utf-8").splitlines()]
-    shapes = [shapely.geometry.shape(feature["geometry"]) for feature in features]
-    assert [(shape.geom_type, len(shape.coords)) for shape in shapes] == [("LineString", 6), ("LineString", 3)]
-    assert features[1]["properties"] == {
-        "id": 2, "height": 1.7, "score": 4.0, "first": 13, "last": 15, "start": 2.6, "duration": 0.4
-    }  # fmt: skip
-    frame = geopandas.read_file(path.with_suffix(".geojsonl"), driver="GeoJSONSeq")
-    assert frame["id"].tolist() == [1, 2]
 
 
 def test_one_place_is_a_point_and_no_number_is_null(tmp_path: Path) -> None:

@@ -89,40 +89,34 @@ def test_all_kinds_together(tmp_path: Path) -> None:
     assert shown(rec, 2) == [(2, 2, 2, 2, 2), (3, 3, 3, 3, 3)] and shown(rec, 4) == shown(rec, 2, 2) == []
 
 
-def test_frames_are_counted_by_decoding(tmp_path: Path) -> None:
-    path = video(tmp_path / "a.avi", 5, "MJPG")
-    data = bytearray(path.read_bytes())
-    for name, total in ((b"avih", 16), (b"strh", 32)):
-        struct.pack_into("<I", data, data.index(name) + 8 + total, 7)
-    path.write_bytes(data)
-    assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 7
-    rec = blank_recording(CameraSource(Source("video", path)))
-    assert index_streams(rec).length == 5 and len(shown(rec)) == 5
-
-
-def test_a_frame_without_boxes_is_no_blind_view(tmp_path: Path) -> None:
+def test_frames_are_counted_by_decoding_boxes_by_their_number(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("1 -1 0 0 5 5 -1\n3 -1 0 0 5 5 -1\n")
     with open_frames(blank_recording(CameraSource(Source("boxes", path, first_frame=1, frames=4)))) as reader:
         views = [frame_set.views[0] for frame_set in reader]
     assert [isinstance(view, Boxes) and len(view) for view in views] == [1, 0, 1, 0]
+    film = video(tmp_path / "a.avi", 5, "MJPG")
+    head = bytearray(film.read_bytes())
+    for name, total in ((b"avih", 16), (b"strh", 32)):
+        struct.pack_into("<I", head, head.index(name) + 8 + total, 7)
+    film.write_bytes(head)
+    assert cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_COUNT) == 7
+    recording = blank_recording(CameraSource(Source("video", film)))
+    assert index_streams(recording).length == 5 and len(shown(recording)) == 5
 
 
-def test_offsets_align_cameras(tmp_path: Path) -> None:
+def test_offsets_align_cameras_and_late_ones_are_blind_or_wrong(tmp_path: Path) -> None:
     early, late = box_camera(tmp_path, 6, offset=-2), box_camera(tmp_path, 3, offset=1)
     assert shown(blank_recording(early, late), first=1) == [(1, 3, 0), (2, 4, 1), (3, 5, 2)]
     assert index_streams(blank_recording(early, late)).length == 4
-
-
-def test_a_late_camera_is_an_error_or_blind(tmp_path: Path) -> None:
     punctual = box_camera(tmp_path, 3)
-    late = blank_recording(punctual, box_camera(tmp_path, 1, offset=2))
-    refused(SourceError, "camera cam2, frame 1: found a stream that starts at frame 2", open_frames, late, first=1)
+    unlike = blank_recording(punctual, box_camera(tmp_path, 1, offset=2))
+    refused(SourceError, "camera cam2, frame 1: found a stream that starts at frame 2", open_frames, unlike, first=1)
     rec = blank_recording(punctual, box_camera(tmp_path, 1, offset=2, blind=True))
     assert shown(rec) == [(0, 0, None), (1, 1, None), (2, 2, 0)]
 
 
-def test_a_short_camera_is_an_error_or_blind(tmp_path: Path) -> None:
+def test_short_cameras_are_errors_or_blind_and_end_recordings(tmp_path: Path) -> None:
     whole, short = box_camera(tmp_path, 4), box_camera(tmp_path, 2)
     reported = (
         "boxes2.csv: camera cam2: found its end at frame 2, where others continue, "
@@ -138,9 +132,6 @@ def test_a_short_camera_is_an_error_or_blind(tmp_path: Path) -> None:
     assert shown(blank_recording(whole, short), 0, 2) == [(0, 0, 0), (1, 1, 1)]
     rec = blank_recording(whole, box_camera(tmp_path, 2, blind=True))
     assert shown(rec) == [(0, 0, 0), (1, 1, 1), (2, 2, None), (3, 3, None)] and index_streams(rec).length == 4
-
-
-def test_a_recording_ends_with_its_required_cameras(tmp_path: Path) -> None:
     rec = blank_recording(box_camera(tmp_path, 2), box_camera(tmp_path, 5, blind=True))
     assert [row[0] for row in shown(rec)] == [0, 1]
     both_blind = blank_recording(box_camera(tmp_path, 2, blind=True), box_camera(tmp_path, 5, blind=True))
@@ -175,11 +166,6 @@ def test_the_split_of_a_film_does_not_matter(tmp_path: Path, cameras: list[tuple
     assert parts == shown(rec) == [(f, *views) for f, views in enumerate(own)]
 
 
-def test_colour_frames_end_no_sooner_than_detections(tmp_path: Path) -> None:
-    rec = blank_recording(beside(tmp_path, 5, 3))
-    refused(SourceError, "camera cam1, images: found its end at frame 3, where the detections go on", shown, rec)
-
-
 def test_videos_of_lossy_codecs_are_grey_and_skipping_is_exact(tmp_path: Path) -> None:
     rec = blank_recording(CameraSource(Source("masks", video(tmp_path / "a.avi", 3, "MJPG"))))
     with open_frames(rec) as reader:
@@ -191,10 +177,19 @@ def test_videos_of_lossy_codecs_are_grey_and_skipping_is_exact(tmp_path: Path) -
     np.testing.assert_allclose([np.mean(view) for view in views if isinstance(view, np.ndarray)], [100, 110], atol=4.5)
 
 
-def test_reading_goes_on_where_it_was_left(tmp_path: Path) -> None:
+def test_reading_goes_on_and_backgrounds_are_by_camera(tmp_path: Path) -> None:
     with open_frames(blank_recording(box_camera(tmp_path, 4))) as reader:
         assert next(reader).frame == 0 and [frame_set.frame for frame_set in reader] == [1, 2, 3]
         assert list(reader) == []
+    rec = blank_recording(box_camera(tmp_path, 3), CameraSource(Source("images", images(tmp_path / "a", 3))))
+    (tmp_path / "a" / "frame_6.png").write_bytes(b"broken")
+    refused(SourceError, r"frame_6\.png: camera cam2, frame 1: found a broken file", shown, rec)
+    source = Source("video", video(tmp_path / "a.avi", 2))
+    rec = blank_recording(
+        CameraSource(source), CameraSource(source, background=Source("images", images(tmp_path / "empty", 3)))
+    )
+    assert [number(view) for view in read_background(rec, 1)] == [0, 1, 2]
+    refused(SourceError, "camera cam1, background: found none", next, read_background(rec, 0))
 
 
 @pytest.mark.parametrize("kind", ["video", "masks", "images"])
@@ -210,7 +205,7 @@ def beside(folder: Path, detections: int, frames: int, offset: int = 0) -> Camer
     return replace(own, images=Source("images", images(folder / f"beside{frames}", frames)))
 
 
-def test_colour_frames_stand_beside_detections(tmp_path: Path) -> None:
+def test_colour_frames_stand_beside_detections_to_their_end(tmp_path: Path) -> None:
     """Frame k of the images is that of frame k of the boxes; more of them are left over."""
     rec = blank_recording(box_camera(tmp_path, 5), beside(tmp_path, 3, 9, offset=2))
     with open_frames(rec, 2, 5) as reader:
@@ -218,12 +213,8 @@ def test_colour_frames_stand_beside_detections(tmp_path: Path) -> None:
     assert found == [(0, None, 0), (1, None, 1), (2, None, 2)]
     with open_frames(rec.without_images(), 2, 5) as reader:
         assert all(frame_set.images == () for frame_set in reader)
-
-
-def test_a_broken_image_is_named(tmp_path: Path) -> None:
-    rec = blank_recording(box_camera(tmp_path, 3), CameraSource(Source("images", images(tmp_path / "a", 3))))
-    (tmp_path / "a" / "frame_6.png").write_bytes(b"broken")
-    refused(SourceError, r"frame_6\.png: camera cam2, frame 1: found a broken file", shown, rec)
+    rec = blank_recording(beside(tmp_path, 5, 3))
+    refused(SourceError, "camera cam1, images: found its end at frame 3, where the detections go on", shown, rec)
 
 
 @cases()
@@ -237,15 +228,6 @@ def test_sources_that_cannot_be_read(
     with pytest.raises((SourceError, FormatError), match=reported):
         shown(rec)
     assert capfd.readouterr().err == ""
-
-
-def test_background_is_read_by_camera(tmp_path: Path) -> None:
-    source = Source("video", video(tmp_path / "a.avi", 2))
-    rec = blank_recording(
-        CameraSource(source), CameraSource(source, background=Source("images", images(tmp_path / "empty", 3)))
-    )
-    assert [number(view) for view in read_background(rec, 1)] == [0, 1, 2]
-    refused(SourceError, "camera cam1, background: found none", next, read_background(rec, 0))
 
 
 def test_real_silhouettes_and_boxes() -> None:
@@ -314,9 +296,6 @@ def test_times_that_tell_nothing_are_no_harm(hour: Path) -> None:
     for times in (np.zeros(900), np.full(900, np.nan), np.arange(900.0)):
         with open_frames(rec, 700, 702, StreamIndex(900, ((times,),))) as reader:
             assert [shown_number(frame_set.views[0]) for frame_set in reader] == [700, 701]
-
-
-def test_one_camera_by_itself(hour: Path) -> None:
     rec = camera_of(hour / "part_*.mp4")
     views = read_camera(rec, 0, range(10, 900, 290), index_streams(rec))
     assert [shown_number(view) for view in views] == [10, 300, 590, 880]

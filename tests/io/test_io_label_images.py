@@ -46,7 +46,6 @@ def mask_sources(folder: Path, frames: int = FRAMES, instances: bool = False) ->
 
 
 def read(folder: Path, camera: str) -> list[Bytes]:
-    """The images of one camera, by the reader of instance images."""
     (own,) = [camera_ for camera_ in two_cameras().cameras if camera_.name == camera]
     stream = open_images(Source("instances", folder / camera), own, 1)
     images = []
@@ -75,16 +74,17 @@ def test_ids_are_read_back_and_the_kind_is_that_of_the_largest(tmp_path: Path, l
     np.testing.assert_array_equal(shown[..., ::-1], colours)
 
 
-def test_a_folder_with_files_is_refused_and_old_images_go(tmp_path: Path) -> None:
+def test_old_images_go_but_foreign_read_and_unwritable_stay(tmp_path: Path) -> None:
     images = LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
     images.write("west", 99, np.zeros((4, 4), np.int64))
     refused(OutputError, "files in it", LabelImages, tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
     LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=True)
     assert not list((tmp_path / "out" / "west").iterdir())
-
-
-def test_images_that_are_foreign_or_are_read_stay(tmp_path: Path) -> None:
-    """Sources are often called as label images are: images/CAMERA/000000.png."""
+    refused(OutputError, "65536", LabelImages, tmp_path / "out", ["west"], 65536, PALETTE, overwrite=False)
+    refused(OutputError, "camera", LabelImages, tmp_path / "out", ["../west"], 3, PALETTE, overwrite=False)
+    (tmp_path / "file").write_text("")
+    refused(OutputError, "found", LabelImages, tmp_path / "file" / "out", ["west"], 3, PALETTE, overwrite=False)
+    # Sources are often called as label images are: images/CAMERA/000000.png.
     out = (tmp_path / "out", ["east", "west"], 3, PALETTE, True)
     LabelImages(*out).write("east", 0, np.zeros((4, 4), np.int64))
     (made,) = (tmp_path / "out" / "east").iterdir()
@@ -95,14 +95,7 @@ def test_images_that_are_foreign_or_are_read_stay(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "west" / "000000.png").exists()
 
 
-def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
-    refused(OutputError, "65536", LabelImages, tmp_path / "out", ["west"], 65536, PALETTE, overwrite=False)
-    refused(OutputError, "camera", LabelImages, tmp_path / "out", ["../west"], 3, PALETTE, overwrite=False)
-    (tmp_path / "file").write_text("")
-    refused(OutputError, "found", LabelImages, tmp_path / "file" / "out", ["west"], 3, PALETTE, overwrite=False)
-
-
-def test_every_frame_of_every_camera_has_an_image_of_ids(run_path: Path, tmp_path: Path) -> None:
+def test_every_frame_has_an_image_of_ids_of_instances_too(run_path: Path, tmp_path: Path) -> None:
     assert main(["labels", str(run_path), "-o", str(tmp_path / "out")]) == 0
     for camera in two_cameras().cameras:
         images = read(tmp_path / "out", camera.name)
@@ -113,6 +106,13 @@ def test_every_frame_of_every_camera_has_an_image_of_ids(run_path: Path, tmp_pat
                 pixel, _ = camera.project(np.array([x, y]), 0.6 * height)
                 if camera.inside(pixel):
                     assert image[round(float(pixel[1])), round(float(pixel[0]))] == identity
+    folder = tmp_path / "instances"
+    folder.mkdir()
+    path = run_of(folder / "run.h5", mask_sources(folder, instances=True))
+    for source, out in ((run_path, "masks_out"), (path, "instances_out")):
+        assert main(["labels", str(source), "-o", str(tmp_path / out)]) == 0
+    ours, theirs = (np.stack(read(tmp_path / out, "west")) for out in ("masks_out", "instances_out"))
+    assert ((ours != theirs).mean(axis=(1, 2)) < 0.01).all()
 
 
 def test_frames_keep_their_numbers_and_their_labels(run_path: Path, tmp_path: Path) -> None:
@@ -128,16 +128,6 @@ def test_frames_keep_their_numbers_and_their_labels(run_path: Path, tmp_path: Pa
         assert path.read_bytes() == (whole / path.parent.name / path.name).read_bytes()
 
 
-def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "instances"
-    folder.mkdir()
-    path = run_of(folder / "run.h5", mask_sources(folder, instances=True))
-    for source, out in ((run_path, "masks_out"), (path, "instances_out")):
-        assert main(["labels", str(source), "-o", str(tmp_path / out)]) == 0
-    ours, theirs = (np.stack(read(tmp_path / out, "west")) for out in ("masks_out", "instances_out"))
-    assert ((ours != theirs).mean(axis=(1, 2)) < 0.01).all()
-
-
 def test_boxes_have_no_label_images_and_blind_views_no_labels(tmp_path: Path) -> None:
     masks, _ = mask_sources(tmp_path, 2)
     masks = CameraSource(masks.source, on_missing="blind")
@@ -145,6 +135,19 @@ def test_boxes_have_no_label_images_and_blind_views_no_labels(tmp_path: Path) ->
     assert main(["labels", str(path), "-o", str(tmp_path / "out")]) == 0
     assert [folder.name for folder in (tmp_path / "out").iterdir()] == ["west"]
     assert [image.any() for image in read(tmp_path / "out", "west")] == [True, True, False, False]
+
+
+def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
+    sources = mask_sources(tmp_path)
+    wide = run_of(tmp_path / "wide.h5", sources, "[labels]\nposition_noise = 0.5\n")
+    plain = run_of(tmp_path / "plain.h5", sources)
+    narrow = ("--set", f"labels.position_noise={LabelConfig().position_noise}")
+    for path, options in ((wide, ()), (wide, narrow), (plain, ())):
+        out = str(tmp_path / f"{path.stem}{len(options)}")
+        assert main(["labels", str(path), "-o", out, "--frames", "0:1", *options]) == 0
+    own, back, default = (read(tmp_path / name, "west")[0] for name in ("wide0", "wide2", "plain0"))
+    np.testing.assert_array_equal(back, default)
+    assert (own != default).any()
 
 
 def box_source(path: Path) -> CameraSource:
@@ -166,16 +169,3 @@ def test_what_the_user_can_mend_is_said(tmp_path: Path, refusal: Command, run_pa
     assert "--frames" in refusal("labels", run_path, "-o", tmp_path / "out", "--frames", "3:9")
     assert "labels.samples: found 0" in refusal("labels", run_path, "-o", tmp_path / "out", "--set", "labels.samples=0")
     assert not (tmp_path / "out").exists()
-
-
-def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
-    sources = mask_sources(tmp_path)
-    wide = run_of(tmp_path / "wide.h5", sources, "[labels]\nposition_noise = 0.5\n")
-    plain = run_of(tmp_path / "plain.h5", sources)
-    narrow = ("--set", f"labels.position_noise={LabelConfig().position_noise}")
-    for path, options in ((wide, ()), (wide, narrow), (plain, ())):
-        out = str(tmp_path / f"{path.stem}{len(options)}")
-        assert main(["labels", str(path), "-o", out, "--frames", "0:1", *options]) == 0
-    own, back, default = (read(tmp_path / name, "west")[0] for name in ("wide0", "wide2", "plain0"))
-    np.testing.assert_array_equal(back, default)
-    assert (own != default).any()

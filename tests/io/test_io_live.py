@@ -100,6 +100,17 @@ def test_files_that_were_read_may_go(tmp_path: Path) -> None:
         refused(SourceError, r"expected west_1\.avi", next, frame_sets)
 
 
+def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
+    rig, reported = write_pieces(tmp_path, empty=True), list[str]()
+    arrive(tmp_path, 1)
+    (tmp_path / "in" / "east_1.avi").unlink()
+    halt, notes = Event(), FileNotes(tmp_path / "files.json")
+    Timer(1.6, halt.set).start()
+    with FollowedFiles(read_recording(rig), 0, None, QUICK, notes, halt, reported.append) as frame_sets:
+        assert list(frame_sets) == []
+    assert reported == ["waiting for the next file of east, at frame 0"]
+
+
 def test_reading_waits_for_who_takes_frames(arriving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read, whole = list[int](), VideoStream.read
 
@@ -129,15 +140,13 @@ def test_a_file_that_was_not_complete_is_told(tmp_path: Path) -> None:
         refused(SourceError, said, lambda: list(frame_sets))
 
 
-def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
-    rig, reported = write_pieces(tmp_path, empty=True), list[str]()
+def test_a_broken_video_among_those_that_arrive_is_told(tmp_path: Path) -> None:
+    rig = write_pieces(tmp_path, empty=True)
     arrive(tmp_path, 1)
-    (tmp_path / "in" / "east_1.avi").unlink()
-    halt, notes = Event(), FileNotes(tmp_path / "files.json")
-    Timer(1.6, halt.set).start()
-    with FollowedFiles(read_recording(rig), 0, None, QUICK, notes, halt, reported.append) as frame_sets:
-        assert list(frame_sets) == []
-    assert reported == ["waiting for the next file of east, at frame 0"]
+    (tmp_path / "in" / "east_1.avi").write_bytes(b"no video")
+    write_at_rate(tmp_path / "in" / "east_2.avi", numbered(0, 2))
+    with followed(rig, tmp_path) as frame_sets:
+        refused(SourceError, r"east_1\.avi: ", next, frame_sets)
 
 
 @pytest.mark.parametrize("source", [
@@ -185,7 +194,7 @@ def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
     np.testing.assert_allclose(np.median(np.diff(shown, axis=0), 0), [1, 2])
 
 
-def test_a_broken_stream_is_reopened_with_growing_pauses() -> None:
+def test_broken_streams_are_reopened_and_full_queues_drop() -> None:
     steady, breaking = StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05, breaks=[30], refused=3)
     reported = list[str]()
     with FollowedCameras(live(), QUICK, None, Event(), reported.append, opening(steady, breaking)) as frame_sets:
@@ -200,9 +209,6 @@ def test_a_broken_stream_is_reopened_with_growing_pauses() -> None:
     ]
     pauses = np.diff(breaking.opened[1:])
     assert (pauses[1:] > 1.5 * pauses[:-1]).all(), pauses
-
-
-def test_a_full_queue_drops_its_oldest_frame_sets() -> None:
     small = replace(QUICK, buffer_memory=5 * 2 * 128 * 96 * 3 / 2**20)
     cameras, halt, reported = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05)), Event(), list[str]()
     with FollowedCameras(live(), small, None, halt, reported.append, opening(*cameras)) as frame_sets:
@@ -221,13 +227,10 @@ def test_a_full_queue_drops_its_oldest_frame_sets() -> None:
     assert reported[0].startswith("tracking is slower than the cameras: 1 frame sets dropped so far")
 
 
-def test_a_run_that_goes_on_keeps_its_clock() -> None:
+def test_a_run_goes_on_by_its_clock_and_ends_at_other_sizes() -> None:
     connect = opening(StandIn(numbered(0), 0.05))
     with FollowedCameras(live((0,)), QUICK, now() - 100, Event(), print, connect) as frame_sets:
         assert 2000 < next(frame_sets).frame < 2100
-
-
-def test_pictures_of_another_size_end_the_run() -> None:
     wrong = StandIn([np.zeros((10, 10, 3), np.uint8)], 0.05)
     with FollowedCameras(live((0,)), QUICK, None, Event(), print, opening(wrong)) as frame_sets:
         refused(SourceError, "10x10", next, frame_sets)
@@ -244,16 +247,4 @@ def test_an_address_in_the_rig_file(tmp_path: Path) -> None:
     assert "rtsp://me:***@there:554/live?channel=1" in provenance.rig
     assert "secret" not in refused(SourceError, "--follow", index_streams, recording)
     refused(RigError, "one address", parse_rig, text.replace('kind = "video"', 'kind = "masks"'), path)
-
-
-def test_only_passwords_are_hidden() -> None:
     assert mask_passwords('"rtsp://a:b@c/d" "rtsp://c:554/d@e"') == '"rtsp://a:***@c/d" "rtsp://c:554/d@e"'
-
-
-def test_a_broken_video_among_those_that_arrive_is_told(tmp_path: Path) -> None:
-    rig = write_pieces(tmp_path, empty=True)
-    arrive(tmp_path, 1)
-    (tmp_path / "in" / "east_1.avi").write_bytes(b"no video")
-    write_at_rate(tmp_path / "in" / "east_2.avi", numbered(0, 2))
-    with followed(rig, tmp_path) as frame_sets:
-        refused(SourceError, r"east_1\.avi: ", next, frame_sets)

@@ -61,12 +61,18 @@ def test_grey_png_of_few_bits_is_not_stretched(tmp_path: Path, bits: int) -> Non
     np.testing.assert_array_equal(read_picture(tmp_path / "a.png", "instances", (4, 3), ""), numbers)
 
 
-def test_interlaced_indexed_png(tmp_path: Path) -> None:
+def test_interlaced_png_and_masks_of_three_channels(tmp_path: Path) -> None:
     """Of the seven passes of Adam7 a 2x2 image has the first, the sixth and the seventh."""
     header = chunk(b"IHDR", struct.pack(">IIBBBBB", 2, 2, 8, INDEXED, 0, 0, 1))
     passes = zlib.compress(bytes([0, 1, 0, 2, 0, 3, 4]))
     (tmp_path / "a.png").write_bytes(png_of(header + chunk(b"PLTE", bytes(768)) + chunk(b"IDAT", passes)))
     assert read_picture(tmp_path / "a.png", "instances", (2, 2), "").tolist() == [[1, 2], [3, 4]]
+    mask = np.random.default_rng(0).integers(0, 256, (6, 8)).astype(np.uint8)
+    for name, picture in (("grey", mask), ("equal", np.dstack([mask] * 3)), ("alpha", np.dstack([mask] * 3 + [mask]))):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), picture)
+        np.testing.assert_array_equal(read_picture(tmp_path / f"{name}.png", "masks", (8, 6), ""), mask)
+    cv2.imwrite(str(tmp_path / "green.png"), np.dstack([0 * mask, mask, 0 * mask]))
+    refused(SourceError, "a picture in colours", read_picture, tmp_path / "green.png", "masks", (8, 6), "camera a")
 
 
 @pytest.mark.parametrize(
@@ -77,15 +83,6 @@ def test_instances_keep_their_numbers(tmp_path: Path, numbers: Bytes | NDArray[n
     read = read_picture(tmp_path / "a.png", "instances", (3, 2), "")
     assert read.dtype == np.uint16
     np.testing.assert_array_equal(read, numbers)
-
-
-def test_masks_of_three_channels_have_no_colours(tmp_path: Path) -> None:
-    mask = np.random.default_rng(0).integers(0, 256, (6, 8)).astype(np.uint8)
-    for name, picture in (("grey", mask), ("equal", np.dstack([mask] * 3)), ("alpha", np.dstack([mask] * 3 + [mask]))):
-        cv2.imwrite(str(tmp_path / f"{name}.png"), picture)
-        np.testing.assert_array_equal(read_picture(tmp_path / f"{name}.png", "masks", (8, 6), ""), mask)
-    cv2.imwrite(str(tmp_path / "green.png"), np.dstack([0 * mask, mask, 0 * mask]))
-    refused(SourceError, "a picture in colours", read_picture, tmp_path / "green.png", "masks", (8, 6), "camera a")
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
@@ -120,29 +117,23 @@ def names(folder: Path, *files: str) -> None:
         (folder / file).touch()
 
 
-def test_folders_are_read_in_the_order_of_their_number(tmp_path: Path) -> None:
+def test_folders_and_patterns_give_files_in_order(tmp_path: Path) -> None:
     names(tmp_path, "cam1_10.png", "cam1_8.png", "cam1_6.png", "readme.txt", "._cam1_6.png")
     assert [path.name for path in image_paths(tmp_path, "")] == ["cam1_6.png", "cam1_8.png", "cam1_10.png"]
-
-
-def test_patterns_choose_files(tmp_path: Path) -> None:
     folder = tmp_path / "scene [1]"
     folder.mkdir()
     names(folder, "view-f9-c0.png", "view-f10-c0.png", "view-f9-c1.png", "view-f10-c1.png")
     found = image_paths(folder / "view-f*-c1.png", "")
     assert [path.name for path in found] == ["view-f9-c1.png", "view-f10-c1.png"]
     assert [path.name for path in image_paths(folder / "view-f9-c0.png", "")] == ["view-f9-c0.png"]
+    refused(SourceError, "no such file or folder", image_paths, tmp_path / "none", "camera a")
+    refused(SourceError, "no images", image_paths, tmp_path / "none_*.png", "camera a")
 
 
 @cases()
 def test_folders_without_a_clear_order_are_refused(tmp_path: Path, files: tuple[str, ...], reported: str) -> None:
     names(tmp_path, *files)
     refused(SourceError, reported, image_paths, tmp_path, "camera a")
-
-
-def test_missing_folders_are_said(tmp_path: Path) -> None:
-    refused(SourceError, "no such file or folder", image_paths, tmp_path / "none", "camera a")
-    refused(SourceError, "no images", image_paths, tmp_path / "none_*.png", "camera a")
 
 
 SIZE = (32, 24)

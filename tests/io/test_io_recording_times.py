@@ -85,7 +85,7 @@ def test_rates_and_lost_frames_are_put_right(whole: Run, tmp_path: Path, capsys:
     assert run.frames.tolist() == list(range(FRAMES))
 
 
-def test_late_and_early_cameras_are_blind_there(tmp_path: Path) -> None:
+def test_late_cameras_are_blind_and_learn_where_they_see(tmp_path: Path) -> None:
     """The run is as long as two of them see: what one alone shows at the beginning is left out."""
     films = [
         Film(regular(FRAMES)).with_source(blind=True),
@@ -95,6 +95,19 @@ def test_late_and_early_cameras_are_blind_there(tmp_path: Path) -> None:
     run = track(write_films(tmp_path, films))
     assert run.frames.tolist() == list(range(16, FRAMES))
     assert presence(run) == [(16, FRAMES - 1)] * 3 and np.median(distances_to_truth(run)) < 0.15
+    # It starts after the part of the recording from which the others learn, and so learns from its own beginning.
+    pictures = [np.full((12, 16, 3), 100 + k % 3, np.uint8) for k in range(60)]
+    write_at_rate(tmp_path / "a.avi", pictures)
+    eye = Camera("late", (16, 12), np.eye(3), np.array([0.0, 0.0, -1.0]))
+    source = CameraSource(Source("video", tmp_path / "a.avi"), None, 40, "blind")
+    late = Recording(tmp_path / "rig.toml", Rig("late", FRAME_RATE, Grid((0, 1), (0, 1)), (eye,)), (source,))
+    config = Config(segments=SegmentConfig(background_period=2.0))
+    for streams in (None, index_streams(late)):
+        (foreground,) = make_foregrounds(late, config, 0, 100, streams=streams)
+        assert foreground.evidence(None) is None
+        (view,) = read_camera(late, 0, [50], streams)
+        likelihood = foreground.evidence(view)
+        assert isinstance(likelihood, np.ndarray) and likelihood.max() < 0.5
 
 
 def gaps_of(run: Run) -> list[tuple[int, str]]:
@@ -116,19 +129,3 @@ def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.Capture
     assert gaps_of(run) == [(27, "gap: no camera has any of the 36 frames before frame 64")] * 3
     windows = run.windows
     assert ((windows["solve_stop"] <= 28) | (windows["solve_first"] >= 64)).all()
-
-
-def test_a_camera_learns_its_background_where_it_sees(tmp_path: Path) -> None:
-    """It starts after the part of the recording from which the others learn, and so learns from its own beginning."""
-    pictures = [np.full((12, 16, 3), 100 + k % 3, np.uint8) for k in range(60)]
-    write_at_rate(tmp_path / "a.avi", pictures)
-    eye = Camera("late", (16, 12), np.eye(3), np.array([0.0, 0.0, -1.0]))
-    source = CameraSource(Source("video", tmp_path / "a.avi"), None, 40, "blind")
-    late = Recording(tmp_path / "rig.toml", Rig("late", FRAME_RATE, Grid((0, 1), (0, 1)), (eye,)), (source,))
-    config = Config(segments=SegmentConfig(background_period=2.0))
-    for streams in (None, index_streams(late)):
-        (foreground,) = make_foregrounds(late, config, 0, 100, streams=streams)
-        assert foreground.evidence(None) is None
-        (view,) = read_camera(late, 0, [50], streams)
-        likelihood = foreground.evidence(view)
-        assert isinstance(likelihood, np.ndarray) and likelihood.max() < 0.5

@@ -38,7 +38,7 @@ def refusal(text: str, kind: type[InputError] = RigError) -> InputError:
 
 
 class TestRead:
-    def test_everything_that_the_file_says(self) -> None:
+    def test_everything_that_the_file_says(self, tmp_path: Path) -> None:
         recording = parse_rig(RIG, FILE)
         rig, grid = recording.rig, recording.rig.grid
         assert (rig.name, rig.frame_rate) == ("room", 5.0)
@@ -53,8 +53,6 @@ class TestRead:
             CameraSource(Source("video", Path("shop/cam1.avi")), Source("video", Path("shop/empty.avi")), -2, "error"),
             CameraSource(Source("boxes", Path("shop/../boxes/cam2.txt"), 1, 263), None, 0, "blind"),
         )
-
-    def test_windows_line_ends_and_byte_order_mark(self, tmp_path: Path) -> None:
         file = tmp_path / "rig.toml"
         file.write_bytes(b"\xef\xbb\xbf" + RIG.replace("\n", "\r\n").encode())
         assert read_recording(file).rig.name == "room"
@@ -106,28 +104,26 @@ class TestWrite:
         write_rig(path, read_recording(path), overwrite=True)
         assert path.read_text() == first and 'path = "../boxes/cam2.txt"' in first
 
-    def test_paths_are_relative_to_the_file(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_paths_are_relative_and_numbers_plain_in_the_file(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         monkeypatch.chdir(tmp_path)
         Path("rigs").mkdir()
         write_rig("rigs/rig.toml", parse_rig(RIG, Path("rig.toml")))
         text = Path("rigs/rig.toml").read_text()
         assert 'path = "../cam1.avi"' in text and 'path = "../../boxes/cam2.txt"' in text
-
-    def test_numpy_numbers_are_plain_in_the_file(self, tmp_path: Path) -> None:
         recording = parse_rig(RIG, FILE)
         grid = dataclasses.replace(recording.rig.grid, cell=np.float64(0.1), planes=int(np.int64(4)))
         rig = dataclasses.replace(recording.rig, grid=grid, frame_rate=5)
         write_rig(tmp_path / "rig.toml", Recording(FILE, rig, recording.sources))
         assert read_recording(tmp_path / "rig.toml").rig.grid.cell == 0.1
 
-    def test_what_could_not_be_read_is_not_written(self, tmp_path: Path) -> None:
+    def test_what_or_where_nothing_can_be_read_is_not_written(self, tmp_path: Path) -> None:
         recording = parse_rig(RIG, FILE)
         path = tmp_path / "rig.toml"
         twins = dataclasses.replace(recording.rig, cameras=(recording.rig.cameras[0],) * 2)
         other = Recording(path, twins, recording.sources)
         refused(RigError, r"rig.toml: camera\[1\].name: found 'cam1'", write_rig, path, other)
         assert not path.exists()
-
-    def test_place_that_cannot_be_written(self, tmp_path: Path) -> None:
-        path = tmp_path / "nowhere/rig.toml"
-        refused(OutputError, r"nowhere/rig.toml: found no such folder", write_rig, path, parse_rig(RIG, FILE))
+        place = tmp_path / "nowhere/rig.toml"
+        refused(OutputError, r"nowhere/rig.toml: found no such folder", write_rig, place, parse_rig(RIG, FILE))

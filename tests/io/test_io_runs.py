@@ -74,7 +74,7 @@ def patch_file(monkeypatch: pytest.MonkeyPatch, hinder: Callable[[memoryview], o
     monkeypatch.setattr(part_file, "lock", lambda _: None)
 
 
-def test_every_table_and_frame_reads_back(run_path: Path) -> None:
+def test_every_table_frame_rig_and_stream_reads_back(run_path: Path) -> None:
     run, (log_odds, label) = read_run(run_path), small_volume()
     assert (run.scene, run.frame_rate, run.cameras) == ("hall", 5.0, ("left", "right"))
     np.testing.assert_array_equal(run.frames, FRAMES)
@@ -90,10 +90,6 @@ def test_every_table_and_frame_reads_back(run_path: Path) -> None:
         assert read_log_odds.dtype == np.float32
         np.testing.assert_array_equal(read_label, label[index])
     np.testing.assert_array_equal(read_trajectory(run_path), small_trajectory())
-
-
-def test_the_provenance_gives_back_the_rig_and_names_the_streams(run_path: Path) -> None:
-    run = read_run(run_path)
     recording = small_recording(run_path.parent)
     assert format_rig(run.recording, recording.path) == format_rig(recording, recording.path)
     assert run.recording.sources == recording.sources and run.provenance.config == CONFIG
@@ -104,34 +100,16 @@ def test_the_provenance_gives_back_the_rig_and_names_the_streams(run_path: Path)
     assert (right["files"], right["size"]) == (0, 0) and np.isnan(right["modified"])
 
 
-def test_a_frame_is_a_compressed_chunk(run_path: Path) -> None:
-    with h5py.File(run_path) as file:
-        assert (file.attrs["NX_class"], file["entry/occupancy"].attrs["NX_class"]) == ("NXroot", "NXdata")
-        for signal in ("log_odds", "label"):
-            dataset = file["entry/occupancy"][signal]
-            assert (dataset.chunks, dataset.compression, dataset.shuffle) == ((1, 3, 4, 6), "gzip", True)
-            assert (dataset.compression_opts, dataset.maxshape[0]) == (1, None)
-        assert file["entry/occupancy/log_odds"].dtype == np.float32
-
-
-def test_the_walkable_area_is_the_polygon() -> None:
-    triangle = Grid((0, 1), (0, 1), polygon=np.array([[0, 0], [1, 0], [0, 1.0]]))
-    assert layout.walkable_area(triangle) == "POLYGON ((0.0 0.0, 1.0 0.0, 0.0 1.0, 0.0 0.0))"
-
-
 def test_equal_runs_differ_only_in_timings_and_provenance(tmp_path: Path) -> None:
     assert_same(write_small_run(tmp_path / "first.h5"), write_small_run(tmp_path / "second.h5"))
 
 
-def test_a_run_of_no_frames_is_a_run(tmp_path: Path) -> None:
+def test_runs_of_no_frames_of_far_log_odds_and_many_appends(tmp_path: Path) -> None:
     with writer_at(tmp_path / "none.h5") as writer:
         writer.finish(Tracks(trajectory_of()).summary())
     run = read_run(tmp_path / "none.h5")
     assert len(run.frames) == len(run.trajectory) == len(run.tracks) == 0
     refused(ValueError, "frame 3", run.read_frame, 3)
-
-
-def test_log_odds_are_kept_in_steps_and_finite(tmp_path: Path) -> None:
     log_odds, label = small_volume(1)
     log_odds[0, 0, 0, 1:5] = np.inf, -1e6, 0.3, -0.33
     with writer_at(tmp_path / "far.h5") as writer:
@@ -139,9 +117,6 @@ def test_log_odds_are_kept_in_steps_and_finite(tmp_path: Path) -> None:
         writer.finish(Tracks(trajectory_of()).summary())
     kept = read_run(tmp_path / "far.h5").read_frame(10)[0][0, 0, :5]
     np.testing.assert_array_equal(kept, [np.nan, 65536, -65536, 10 / 32, -11 / 32])
-
-
-def test_many_small_appends_make_one_table(tmp_path: Path) -> None:
     rows = table_of(TRAJECTORY, frame=np.arange(10_000), id=1)
     with writer_at(tmp_path / "long.h5") as writer:
         for start in range(0, len(rows), 7):
@@ -152,7 +127,7 @@ def test_many_small_appends_make_one_table(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_trajectory(tmp_path / "long.h5"), rows)
 
 
-def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
+def test_slips_are_refused_and_parts_of_killed_runs_removed(tmp_path: Path) -> None:
     log_odds, label = small_volume(2)
     with writer_at(tmp_path / "slip.h5") as writer:
         append_frames(writer, np.array([4, 6]), log_odds, label)
@@ -161,9 +136,15 @@ def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
         refused(ValueError, "rows", writer.append, "ghosts", np.zeros(1, layout.ghost_type(3)))
     other = tmp_path / "other.h5"
     refused(ValueError, "views", RunWriter, other, small_recording(tmp_path), VIEWS[:2], CONFIG, overwrite=False)
+    part, descriptor = create_part(tmp_path / "night.h5")
+    os.close(descriptor)
+    (tmp_path / "night.h5.part").write_text("precious")
+    assert len(read_run(write_small_run(tmp_path / "night.h5")).frames) == 6
+    assert not part.exists()
+    assert (tmp_path / "night.h5.part").read_text() == "precious"
 
 
-def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
+def test_overwriting_replaces_at_the_end_in_chunks_and_polygon(run_path: Path) -> None:
     before = run_path.read_bytes()
     refused(OutputError, "exists", writer_at, run_path)
     assert run_path.read_bytes() == before and not parts_of(run_path)
@@ -172,6 +153,15 @@ def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
         assert run_path.read_bytes() == before and parts_of(run_path)
         writer.finish(Tracks(small_trajectory()[:0]).summary())
     assert len(read_run(run_path).tracks) == 0 and not parts_of(run_path)
+    with h5py.File(run_path) as file:
+        assert (file.attrs["NX_class"], file["entry/occupancy"].attrs["NX_class"]) == ("NXroot", "NXdata")
+        for signal in ("log_odds", "label"):
+            dataset = file["entry/occupancy"][signal]
+            assert (dataset.chunks, dataset.compression, dataset.shuffle) == ((1, 3, 4, 6), "gzip", True)
+            assert (dataset.compression_opts, dataset.maxshape[0]) == (1, None)
+        assert file["entry/occupancy/log_odds"].dtype == np.float32
+    triangle = Grid((0, 1), (0, 1), polygon=np.array([[0, 0], [1, 0], [0, 1.0]]))
+    assert layout.walkable_area(triangle) == "POLYGON ((0.0 0.0, 1.0 0.0, 0.0 1.0, 0.0 0.0))"
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -245,15 +235,6 @@ def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: py
         with suppress(KeyboardInterrupt):
             write(interrupt)
     assert len(reached) > 50
-
-
-def test_the_part_of_a_killed_run_alone_is_removed(tmp_path: Path) -> None:
-    part, descriptor = create_part(tmp_path / "night.h5")
-    os.close(descriptor)
-    (tmp_path / "night.h5.part").write_text("precious")
-    assert len(read_run(write_small_run(tmp_path / "night.h5")).frames) == 6
-    assert not part.exists()
-    assert (tmp_path / "night.h5.part").read_text() == "precious"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs the locks of POSIX systems")
@@ -338,7 +319,7 @@ def test_text_outputs_replace_only_when_whole(tmp_path: Path) -> None:
     assert [file.read_text() for file in tmp_path.iterdir()] == ["new"]
 
 
-def test_what_is_no_run_file_is_told_by_name(tmp_path: Path) -> None:
+def test_what_is_no_run_file_and_no_table_is_told(tmp_path: Path, run_path: Path) -> None:
     refused(FormatError, "no such file", read_run, tmp_path / "none.h5")
     (tmp_path / "text.h5").write_text("frame,id,x,y\n")
     refused(FormatError, "not HDF5", read_run, tmp_path / "text.h5")
@@ -346,9 +327,10 @@ def test_what_is_no_run_file_is_told_by_name(tmp_path: Path) -> None:
         file["x"] = 1
     refused(FormatError, "/@format: found nothing", read_run, tmp_path / "other.h5")
     refused(FormatError, "found", read_run, tmp_path)
-
-
-def test_a_cut_off_file_is_told(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        del file["boxes"]
+        file.create_group("boxes")
+    refused(FormatError, "/boxes: found no array", read_run, run_path)
     run_path.write_bytes(run_path.read_bytes()[:-3000])
     refused(FormatError, "whole run file", read_run, run_path)
 
@@ -369,22 +351,12 @@ def test_what_is_missing_or_wrong_is_named(run_path: Path, place: str, value: ob
     refused(FormatError, re.escape(f"{run_path}: {named}"), read_run, run_path)
 
 
-def test_a_group_is_no_table(run_path: Path) -> None:
-    with h5py.File(run_path, "r+") as file:
-        del file["boxes"]
-        file.create_group("boxes")
-    refused(FormatError, "/boxes: found no array", read_run, run_path)
-
-
-def test_a_run_without_rates_has_an_overview(run_path: Path) -> None:
+def test_runs_without_rates_and_with_a_broken_chunk(run_path: Path) -> None:
     with h5py.File(run_path, "r+") as file:
         file["rates"].resize((0,))
     run = read_run(run_path)
     assert (len(run.rates), run.rates.dtype) == (0, RATES) and not len(run.data_frame("rates"))
     assert (summarise_run(run).rates, len(run.windows)) == ({}, 2)
-
-
-def test_a_broken_chunk_is_told_when_it_is_read(run_path: Path) -> None:
     with h5py.File(run_path) as file:
         chunk = file["trajectory"].id.get_chunk_info(0)
     data = bytearray(run_path.read_bytes())

@@ -90,15 +90,12 @@ def test_other_rates(step: float, expected: list[int]) -> None:
     assert nearest_frames(every(step, 40), step)[:6].tolist() == expected
 
 
-def test_a_frame_between_two_ticks_is_shown_steadily() -> None:
+def test_frames_between_ticks_are_steady_dropped_ones_holes() -> None:
     """A late second frame, then frames that are a little early or late, half-way between ticks."""
     off = np.random.default_rng(3).uniform(-0.1, 0.1, 500)
     position = np.append(0.0, np.arange(1, 500) + 0.5 + off[1:])
     frame_at_tick = nearest_frames(position, 1.0)
     assert frame_at_tick[:499].tolist() in (list(range(499)), [0, *range(2, 500)])
-
-
-def test_dropped_frames_leave_holes() -> None:
     assert nearest_frames(np.array([0.0, 1, 2, 5, 6, 8]), 1.0).tolist() == [0, 1, 2, -1, -1, 3, 4, -1, 5]
 
 
@@ -111,13 +108,10 @@ def test_files_join_as_if_they_were_one(rate: float, lengths: list[int]) -> None
     assert stamps is not None and np.abs(stamps.position - np.arange(sum(lengths))).max() < 0.1
 
 
-def test_a_week_of_hours_does_not_drift() -> None:
+def test_a_week_of_hours_does_not_drift_nor_does_another_rate() -> None:
     times = [np.round(every(1000 / RATE, 3600) + 0.3)] * 168
     stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 168, NONE)
     assert stamps is not None and stamps.fits(np.arange(3600.0 * 168))
-
-
-def test_another_rate_goes_on_over_borders() -> None:
     times = [every(40.0, 500)] * 3
     stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 3, NONE)
     assert stamps is not None
@@ -130,11 +124,15 @@ def test_stamps_that_do_not_rise_are_none(times: list[float]) -> None:
     assert interpret_stamps([np.array(times)], RATE, [Path("x.mkv")], NONE) is None
 
 
-def test_starts_leave_gaps_and_cannot_overlap() -> None:
+def test_starts_and_blind_cameras_leave_gaps() -> None:
     files, paths = [every(1.0, 3), every(1.0, 2)], [Path("a"), Path("b")]
     assert concatenate_files(files, 1.0, RATE, paths, np.array([0.0, 0.7])).tolist() == [0, 1, 2, 7, 8]
     said = r"b: starts: found 0\.200 s, when the previous file goes on until 0\.200 s"
     refused(SourceError, said, concatenate_files, files, 1.0, RATE, paths, np.array([0.0, 0.2]))
+    shown = [np.array([[2, 8], [24, 29]]), np.array([[6, 10], [15, 22]])]
+    assert find_gaps(shown, 0, 30, 2) == [(10, 15)]
+    assert find_gaps(shown, 0, 30, 1) == [(0, 2), (10, 15), (22, 24)]
+    assert find_gaps(shown, 12, 23, 2) == [(12, 15)] and find_gaps(shown, 11, 14, 2) == [(11, 14)]
 
 
 WRONG_HEADERS = "cam1, cam2: the time stamps say 20 frames per second, the rig 10; the frames are counted"
@@ -159,11 +157,18 @@ def test_frames_are_counted(cameras: list[Floats], notes: list[str]) -> None:
     assert all("the frames are counted" in note for note in clock.notes)
 
 
-def test_stamps_that_vary_are_believed() -> None:
+def test_stamps_that_vary_or_drift_or_are_asked_for_count() -> None:
     clock = decided((video(), WAVERING), (video(), every(1.0, 61)))
     assert clock.frame_at_tick[1] is None
     assert np.flatnonzero(np.asarray(clock.frame_at_tick[0]) < 0).tolist() == [30]
     assert [note[:26] for note in clock.notes] == ["cam1: the time stamps vary"]
+    clock = decided((video(), every(1.0, 2000)), (video(), every(1.001, 1998)))
+    assert np.asarray(clock.frame_at_tick[1])[[0, 1, 2, 1900]].tolist() == [0, 1, 2, 1898]
+    assert decided((video(clock="count"), WAVERING)) == TimeAlignment((None,), ())
+    clock = decided((video(clock="stamps"), every(0.5, 60)))
+    assert np.asarray(clock.frame_at_tick[0]).tolist() == list(range(0, 60, 2)) and clock.notes == ()
+    said = "camera cam1, clock: found files without time stamps that rise"
+    refused(SourceError, said, decided, (video(clock="stamps"), np.full(3, np.nan)))
 
 
 @pytest.mark.parametrize("other", [every(1.0, 60), WAVERING])
@@ -173,22 +178,19 @@ def test_another_rate_counts_if_a_camera_keeps_the_rigs(other: Floats) -> None:
     assert any("20 frames per second, the rig 10; each tick shows the nearest frame" in n for n in clock.notes)
 
 
-def test_clocks_that_drift_apart_are_held_together() -> None:
-    clock = decided((video(), every(1.0, 2000)), (video(), every(1.001, 1998)))
-    assert np.asarray(clock.frame_at_tick[1])[[0, 1, 2, 1900]].tolist() == [0, 1, 2, 1898]
-
-
-def test_the_rig_may_say_what_is_believed() -> None:
-    assert decided((video(clock="count"), WAVERING)) == TimeAlignment((None,), ())
-    clock = decided((video(clock="stamps"), every(0.5, 60)))
-    assert np.asarray(clock.frame_at_tick[0]).tolist() == list(range(0, 60, 2)) and clock.notes == ()
-    said = "camera cam1, clock: found files without time stamps that rise"
-    refused(SourceError, said, decided, (video(clock="stamps"), np.full(3, np.nan)))
-
-
-def test_avi_holds_no_times(tmp_path: Path) -> None:
+def test_avi_holds_no_times_and_no_stamps_cost_no_memory(tmp_path: Path) -> None:
     path = write_at_rate(tmp_path / "a.avi", [np.zeros((12, 16, 3), np.uint8)] * 3, RATE)
     assert decided((video(str(path)), WAVERING)) == TimeAlignment((None,), ())
+    (tmp_path / "boxes.csv").write_text("frame,left,top,width,height\n5,1,2,3,4\n19999990,1,2,3,4\n")
+    far = recording(CameraSource(Source("boxes", tmp_path / "boxes.csv")))
+    tracemalloc.start()
+    streams = pickle.loads(pickle.dumps(index_streams(far)))
+    with WorkFolder(tmp_path / "run.h5", {}) as work:
+        work.keep_streams(streams)
+        kept = work.streams(far)
+    assert tracemalloc.get_traced_memory()[1] < 60e6
+    tracemalloc.stop()
+    assert [index and index.multi_view_range(far) for index in (streams, kept)] == [(0, 19_999_991)] * 2
 
 
 @pytest.mark.parametrize("blind", [False, True])
@@ -223,13 +225,6 @@ def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None
             tick = frame - offset
             expected = 0 <= tick < count and (source.frame_at_tick is None or source.frame_at_tick[tick] >= 0)
             assert any(first <= frame < stop for first, stop in own) == expected
-
-
-def test_gaps_are_what_nobody_sees_for_long() -> None:
-    shown = [np.array([[2, 8], [24, 29]]), np.array([[6, 10], [15, 22]])]
-    assert find_gaps(shown, 0, 30, 2) == [(10, 15)]
-    assert find_gaps(shown, 0, 30, 1) == [(0, 2), (10, 15), (22, 24)]
-    assert find_gaps(shown, 12, 23, 2) == [(12, 15)] and find_gaps(shown, 11, 14, 2) == [(11, 14)]
 
 
 def shown_number(view: Observation) -> int | None:
@@ -270,25 +265,19 @@ def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
     assert [int(np.diff(own).sum()) for own in streams.visible_ranges(uneven)] == [20, 17, 19]
 
 
-def test_frames_without_stamps_cost_no_memory(tmp_path: Path) -> None:
-    (tmp_path / "boxes.csv").write_text("frame,left,top,width,height\n5,1,2,3,4\n19999990,1,2,3,4\n")
-    far = recording(CameraSource(Source("boxes", tmp_path / "boxes.csv")))
-    tracemalloc.start()
-    streams = pickle.loads(pickle.dumps(index_streams(far)))
-    with WorkFolder(tmp_path / "run.h5", {}) as work:
-        work.keep_streams(streams)
-        kept = work.streams(far)
-    assert tracemalloc.get_traced_memory()[1] < 60e6
-    tracemalloc.stop()
-    assert [index and index.multi_view_range(far) for index in (streams, kept)] == [(0, 19_999_991)] * 2
-
-
-def test_cameras_that_end_apart_by_stamps_are_refused(tmp_path: Path) -> None:
+def test_the_rig_says_clocks_and_ends_apart_are_refused(tmp_path: Path) -> None:
     rec = recording(
         stamped(tmp_path / "a.mkv", every(0.1, 31)), stamped(tmp_path / "b.mkv", np.delete(every(0.1, 20), 5))
     )
     reported = r'cam2: found its end at frame 20.* or on_missing = "blind", or clock = "count" where time stamps'
     refused(SourceError, reported, index_streams, rec)
+    path = tmp_path / "rig.toml"
+    source = Source("video", tmp_path / "a.mkv", more=(tmp_path / "b.mkv",), starts=(0.0, 3600.5))
+    write_rig(path, recording(CameraSource(source, clock="stamps")))
+    assert read_recording(path).sources[0].source.starts == (0.0, 3600.5)
+    assert read_recording(path).sources[0].clock == "stamps"
+    path.write_text(path.read_text().replace('clock = "stamps"', 'clock = "sundial"'))
+    refused(RigError, "clock", read_recording, path)
 
 
 def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> None:
@@ -302,13 +291,3 @@ def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> No
         np.testing.assert_equal(tuple(again.frame_at_tick), tuple(streams.frame_at_tick))
     provenance = gather_provenance(with_alignment(uneven, streams.frame_at_tick), "")
     assert sorted(provenance.frame_at_tick) == ["cam2", "cam3"]
-
-
-def test_the_rig_file_says_clock_and_starts(tmp_path: Path) -> None:
-    path = tmp_path / "rig.toml"
-    source = Source("video", tmp_path / "a.mkv", more=(tmp_path / "b.mkv",), starts=(0.0, 3600.5))
-    write_rig(path, recording(CameraSource(source, clock="stamps")))
-    assert read_recording(path).sources[0].source.starts == (0.0, 3600.5)
-    assert read_recording(path).sources[0].clock == "stamps"
-    path.write_text(path.read_text().replace('clock = "stamps"', 'clock = "sundial"'))
-    refused(RigError, "clock", read_recording, path)

@@ -16,12 +16,10 @@ from stseg.records.tables import TRAJECTORY
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A file that is not there yet."""
     return tmp_path / "tracks.csv"
 
 
 def trajectory(rows: list[tuple[float, float]]) -> np.ndarray:
-    """One person, one row a frame."""
     x, y = np.array(rows, float).reshape(-1, 2).T
     covariance, frame = {"xx": 0.01, "xy": -0.0012345, "yy": 0.02}, np.arange(len(rows))
     return table_of(TRAJECTORY, frame=frame, id=4, x=x, y=y, height=1.754, score=np.inf, views=3, **covariance)
@@ -43,7 +41,7 @@ def test_positions_survive_a_table(tmp_path_factory: pytest.TempPathFactory, row
         np.testing.assert_allclose(read[name], written[name], rtol=0, atol=1e-4)
 
 
-def test_a_line_is_short_and_readable(path: Path) -> None:
+def test_lines_are_short_and_columns_in_any_order(path: Path) -> None:
     write_tracks_csv(path, trajectory([(1 / 3, -2)]))
     assert path.read_text().splitlines() == [
         "frame,id,x,y,height,score,xx,xy,yy,views",
@@ -51,13 +49,15 @@ def test_a_line_is_short_and_readable(path: Path) -> None:
     ]
     path.write_text("frame,id,x,y,flag\n3,1,0.5,0.25,0\n")
     refused(OutputError, "did not make", write_tracks_csv, path, trajectory([]), overwrite=True)
-
-
-def test_columns_may_stand_in_any_order_and_flags_be_empty(path: Path) -> None:
     path.write_text("\ufeffnote, y ,x,id,frame\n\nhello,2,1,7,12.0\n", encoding="utf-8")
     assert read_tracks_csv(path).tolist() == [(12, 7, 1.0, 2.0, 0)]
     path.write_text("frame,id,x,y,flag\n0,1,0,0,\n0,2,0,0,3\n")
     assert read_tracks_csv(path)["flag"].tolist() == [0, 3]
+    path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
+    refused(FormatError, "not text", read_tracks_csv, path)
+    refused(FormatError, "No such file", read_tracks_csv, path.with_name("nowhere.csv"))
+    refused(FormatError, "directory", read_tracks_csv, path.parent)
+    refused(OutputError, "nowhere", write_tracks_csv, path.parent / "nowhere" / "tracks.csv", trajectory([]))
 
 
 @pytest.mark.parametrize(
@@ -67,14 +67,6 @@ def test_ids_are_numbers_or_names(path: Path, ids: str, read: list[int]) -> None
     one, other = ids.split()
     path.write_text(f"frame,id,x,y\n0,{one},0,0\n0,{other},1,1\n1,{one},0,0\n")
     assert read_tracks_csv(path)["id"].tolist() == [*read, read[0]]
-
-
-def test_files_that_cannot_be_read_or_written_are_named(path: Path) -> None:
-    path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
-    refused(FormatError, "not text", read_tracks_csv, path)
-    refused(FormatError, "No such file", read_tracks_csv, path.with_name("nowhere.csv"))
-    refused(FormatError, "directory", read_tracks_csv, path.parent)
-    refused(OutputError, "nowhere", write_tracks_csv, path.parent / "nowhere" / "tracks.csv", trajectory([]))
 
 
 @pytest.mark.parametrize("text", ["1_000", "٣", "inf", "nan", "1e999", "0x1", "", " ", "1" * 500, "1e", "--1"])

@@ -49,14 +49,6 @@ def test_unconfirmed_is_not_sent(address: str, library: dict[str, object], monke
     refused(OSError, "no answer of the", receiver_of(address).send, b"")
 
 
-def test_errors_are_said_without_passwords_and_escape_codes() -> None:
-    said = list[str]()
-    with Publisher(Mock(send=Mock(side_effect=OSError("\x1b http://a:word@h"))), 5.0, said.append) as publisher:
-        publisher.append(rows_of(7))
-        wait_for(lambda: said)
-    assert said[0] == r"publishing waits for its receiver (\x1b http://a:***@h)"
-
-
 @pytest.fixture
 def free_port() -> int:
     """A port at which nobody listens."""
@@ -107,17 +99,20 @@ def posted() -> Iterator[tuple[str, list[bytes], list[int]]]:
     server.server_close()
 
 
-def test_rows_arrive_by_http(posted: tuple[str, list[bytes], list[int]]) -> None:
+def test_rows_arrive_by_http_with_passwords_and_open_heights(
+    posted: tuple[str, list[bytes], list[int]], tmp_path: Path
+) -> None:
     address, bodies, _ = posted
     with publisher_to(address) as publisher:
         publisher.append(rows_of(7, 8))
         publisher.append(rows_of())
         publisher.append(rows_of(9))
     assert [len(body.splitlines()) for body in bodies] == [2, 1] and parsed(bodies) == EXPECTED
-
-
-def test_an_unmeasured_height_is_null_there(posted: tuple[str, list[bytes], list[int]], tmp_path: Path) -> None:
-    address, bodies, _ = posted
+    bodies.clear()
+    with publisher_to(address.replace("://", "://me:s%20cret@")) as publisher:
+        publisher.append(rows_of(7))
+    assert len(bodies) == 1
+    bodies.clear()
     rows = rows_of(7)
     rows["height"] = np.nan
     with publisher_to(address) as publisher, LiveTable(tmp_path / "live.csv", 5.0, 0) as live:
@@ -141,14 +136,7 @@ def test_a_receiver_that_fails_gets_all(posted: tuple[str, list[bytes], list[int
     assert [line.split(" (")[0] for line in said] == ["publishing waits for its receiver", "publishing goes on"]
 
 
-def test_a_receiver_may_ask_for_a_password(posted: tuple[str, list[bytes], list[int]]) -> None:
-    address, bodies, _ = posted
-    with publisher_to(address.replace("://", "://me:s%20cret@")) as publisher:
-        publisher.append(rows_of(7))
-    assert len(bodies) == 1
-
-
-def test_an_answer_that_is_no_http_is_one_line() -> None:
+def test_errors_are_one_line_without_passwords() -> None:
     said: list[str] = []
     with socket.create_server(("127.0.0.1", 0)) as server:
 
@@ -164,9 +152,14 @@ def test_an_answer_that_is_no_http_is_one_line() -> None:
             wait_for(lambda: said, 5)
         thread.join(10)
     assert said[0].startswith("publishing waits for its receiver (") and "\n" not in said[0]
+    reported = list[str]()
+    with Publisher(Mock(send=Mock(side_effect=OSError("\x1b http://a:word@h"))), 5.0, reported.append) as publisher:
+        publisher.append(rows_of(7))
+        wait_for(lambda: reported)
+    assert reported[0] == r"publishing waits for its receiver (\x1b http://a:***@h)"
 
 
-def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch, free_port: int) -> None:
+def test_missing_receivers_or_libraries_delay_nothing(monkeypatch: pytest.MonkeyPatch, free_port: int) -> None:
     monkeypatch.setattr("stseg.io.live.publishing._WAITING", 10)
     said: list[str] = []
     begun = time.monotonic()
@@ -176,6 +169,8 @@ def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch, free
         assert time.monotonic() - begun < 2
     assert time.monotonic() - begun < 10
     assert said[-1].startswith("30 messages were not published")
+    monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
+    refused(ConfigError, r"pip install 'stseg\[websocket\]'", receiver_of, "ws://127.0.0.1/")
 
 
 BAD_ADDRESSES = (
@@ -271,11 +266,6 @@ def test_a_web_server_that_is_none_of_sockets_is_one_line(posted: tuple[str, lis
         "publishing waits for its receiver (did not receive a valid HTTP response)",
         "1 messages were not published; the live table has their rows",
     ]
-
-
-def test_without_its_library_a_web_socket_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
-    refused(ConfigError, r"pip install 'stseg\[websocket\]'", receiver_of, "ws://127.0.0.1/")
 
 
 def test_rows_arrive_at_a_broker(free_port: int) -> None:

@@ -42,7 +42,7 @@ def run_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_small_run(tmp_path_factory.mktemp("run") / "night.h5")
 
 
-def test_silx_opens_the_file_at_the_volume(run_path: Path) -> None:
+def test_silx_and_pedpy_open_the_run_file_by_its_addresses(run_path: Path) -> None:
     with silx.io.open(str(run_path)) as file:
         shown = silx.io.nxdata.get_default(file)
         assert shown is not None and shown.is_valid
@@ -56,13 +56,19 @@ def test_silx_opens_the_file_at_the_volume(run_path: Path) -> None:
             assert axis.attrs["long_name"].endswith(f"({units})")  # all that silx writes at the axis
             np.testing.assert_allclose(axis[()], values)
         np.testing.assert_array_equal(shown.auxiliary_signals[0][()], small_volume()[1])
-
-
-def test_silx_reads_a_frame_and_a_table_by_their_address(run_path: Path) -> None:
     frame = silx.io.get_data(f"silx:{run_path}?path={layout.OCCUPANCY}/log_odds&slice=2")
     np.testing.assert_allclose(frame, small_volume()[0][2], rtol=1e-3)
     table = silx.io.get_data(f"silx:{run_path}?path=/trajectory")
     np.testing.assert_array_equal(table["x"], small_trajectory()["x"])
+    data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run_path)
+    assert data.frame_rate == 5.0
+    found = data.data.sort_values(["frame", "id"])
+    for name in ("frame", "id", "x", "y", "score"):
+        np.testing.assert_array_equal(found[name], small_trajectory()[name])
+    area = pedpy.load_walkable_area_from_ped_data_archive_hdf5(trajectory_file=run_path)
+    assert area.polygon.equals(shapely.box(0, 0, 0.6, 0.4))
+    density = pedpy.compute_classic_density(traj_data=data, measurement_area=pedpy.MeasurementArea(area.polygon))
+    np.testing.assert_allclose(density["density"], [1 / 0.24] * 3 + [2 / 0.24] * 3)
 
 
 def test_xarray_has_named_axes_with_units_and_selects_by_them(run_path: Path) -> None:
@@ -79,19 +85,7 @@ def test_xarray_has_named_axes_with_units_and_selects_by_them(run_path: Path) ->
         assert int(place) == label[4, 1, 2, 4] == 2
 
 
-def test_pedpy_takes_trajectory_and_area_from_the_run_file(run_path: Path) -> None:
-    data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run_path)
-    assert data.frame_rate == 5.0
-    found = data.data.sort_values(["frame", "id"])
-    for name in ("frame", "id", "x", "y", "score"):
-        np.testing.assert_array_equal(found[name], small_trajectory()[name])
-    area = pedpy.load_walkable_area_from_ped_data_archive_hdf5(trajectory_file=run_path)
-    assert area.polygon.equals(shapely.box(0, 0, 0.6, 0.4))
-    density = pedpy.compute_classic_density(traj_data=data, measurement_area=pedpy.MeasurementArea(area.polygon))
-    np.testing.assert_allclose(density["density"], [1 / 0.24] * 3 + [2 / 0.24] * 3)
-
-
-def test_tables_as_data_frames(run_path: Path) -> None:
+def test_tables_as_data_frames_where_pandas_is(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = read_run(run_path)
     table = run.data_frame("trajectory")
     assert list(table.columns) == [*(run.trajectory.dtype.names or ()), "time"]
@@ -104,14 +98,11 @@ def test_tables_as_data_frames(run_path: Path) -> None:
     for name in layout.ABOUT:
         assert isinstance(run.data_frame(name), pandas.DataFrame)
     refused(ValueError, "table 'people' is none of trajectory", run.data_frame, "people")
-
-
-def test_pandas_is_asked_for_where_it_is_missing(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     refused(ConfigError, r"pip install 'stseg\[pandas\]'", read_run(run_path).data_frame, "tracks")
 
 
-def test_napari_s_layers_are_in_seconds_and_metres(run_path: Path) -> None:
+def test_napari_s_layers_are_in_seconds_metres_and_on_disk(run_path: Path) -> None:
     reader = get_reader(str(run_path))
     assert reader is not None
     (volume, about, kind), (label, about_label, kind_label), (tracks, about_tracks, kind_tracks) = reader(str(run_path))
@@ -132,11 +123,8 @@ def test_napari_s_layers_are_in_seconds_and_metres(run_path: Path) -> None:
     assert tracks[:, 0].tolist() == about_tracks["features"]["id"].tolist() == expected["id"].tolist()
     np.testing.assert_allclose(world[:, 0], expected["frame"] / 5)
     np.testing.assert_allclose(world[:, 2:], np.stack([expected["y"], expected["x"]], -1))
-
-
-def test_napari_is_given_a_frame_at_a_time(run_path: Path) -> None:
-    (volume, _, _), (label, _, _), _ = read_layers(str(run_path))
-    assert isinstance(volume, h5py.Dataset) and isinstance(label, h5py.Dataset)
+    (stored, _, _), (names, _, _), _ = read_layers(str(run_path))
+    assert isinstance(stored, h5py.Dataset) and isinstance(names, h5py.Dataset)
 
 
 def test_napari_s_other_files_are_left_to_others(run_path: Path, tmp_path: Path) -> None:
@@ -161,9 +149,6 @@ def test_the_manifest_leads_npe2_to_the_reader(run_path: Path) -> None:
     assert contribution.plugin_name == "stseg"
     layers = contribution.exec(kwargs={"path": [str(run_path)], "stack": False, "_registry": manager.commands})
     assert [kind for _, _, kind in layers([str(run_path)], stack=False)] == ["image", "labels", "tracks"]
-
-
-def test_the_package_says_where_its_manifest_is() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     assert project["project"]["entry-points"]["napari.manifest"] == {"stseg": "stseg:napari.yaml"}
 
