@@ -56,11 +56,14 @@ def rows_of(views: list[Observation], likely: list[ViewEvidence], axes: Floats |
     return appearance_rows(7, explained(), TABLES, axes, views, likely)
 
 
-def test_no_people_have_no_rows() -> None:
+def test_no_people_and_masks_have_no_looks() -> None:
     no_people = found(STANDING[:0])
     empty = tuple(np.full((camera.size[1] // 2, camera.size[0] // 2), -1, np.int16) for camera in CAMERAS)
     explanation = Explanation(no_people, no_people, empty, (2,) * 4, (np.zeros(0, np.int64),) * 4, np.zeros(4))
     assert not len(appearance_rows(0, explanation, TABLES, None, *painted()))
+    views, likely = painted()
+    assert not len(rows_of([mask(camera, STANDING) for camera in CAMERAS], likely))
+    assert not len(rows_of(views, [None] * 4))
 
 
 def assert_worn(rows: Rows) -> None:
@@ -79,13 +82,10 @@ def test_colours_are_those_that_each_person_wears() -> None:
     assert np.isnan(rows["features"]).all()
 
 
-def test_a_camera_of_another_gain_differs_by_one_offset() -> None:
+def test_gains_are_offsets_and_who_is_covered_has_no_looks() -> None:
     bright, dark = rows_of(*painted()), rows_of(*painted(0.6))
     offset = (bright["colours"] - dark["colours"]).astype(float)
     assert np.ptp(offset) < 0.25 and abs(offset.mean() - np.log(1 / 0.6)) < 0.2
-
-
-def test_a_person_whom_others_cover_has_no_looks() -> None:
     views, likely = painted()
     hidden = explained()
     hidden.people.visibility[1, 0] = 0.2
@@ -124,12 +124,6 @@ def test_colours_beside_boxes_are_those_of_their_middles() -> None:
     assert not len(appearance_rows(7, explanation, TABLES, None, likely, likely, [None] * 4))
 
 
-def test_masks_have_no_looks() -> None:
-    views, likely = painted()
-    assert not len(rows_of([mask(camera, STANDING) for camera in CAMERAS], likely))
-    assert not len(rows_of(views, [None] * 4))
-
-
 def source(folder: Path, features: Floats, **more: object) -> Source:
     boxes_at = [(2, 0.9), (0, 0.2), (0, 0.8), (1, 0.7)]
     lines = [f"{frame},{10 * k},5,8,20,{score}\n" for k, (frame, score) in enumerate(boxes_at)]
@@ -138,20 +132,17 @@ def source(folder: Path, features: Floats, **more: object) -> Source:
     return Source("boxes", folder / "boxes.csv", appearance=folder / "looks.npy", **more)  # type: ignore[arg-type]
 
 
-def test_rows_of_features_are_those_of_the_boxes(tmp_path: Path) -> None:
+def test_rows_of_features_are_those_of_the_rig_files_boxes(tmp_path: Path) -> None:
     """Boxes need not be in the order of frames, and some are left out by their scores."""
     stream = open_stream(source(tmp_path, np.arange(4.0)[:, None] + [0, 10], least_score=0.5), CAMERAS[0])
     found = [b for b in iter(stream.read, None) if isinstance(b, Boxes) and b.features is not None]
     assert [b.features.tolist() for b in found] == [[[2, 12]], [[3, 13]], [[0, 10]]]  # type: ignore[union-attr]
     assert [b.pixel[:, 0].tolist() for b in found] == [[20], [30], [0]]
-
-
-def test_the_rig_file_names_the_file_of_features(tmp_path: Path) -> None:
     sources = tuple(CameraSource(source(tmp_path, np.zeros((4, 2)))) for _ in CAMERAS)
     text = format_rig(Recording(tmp_path / "rig.toml", RIG, sources), tmp_path / "rig.toml")
     assert 'appearance = "looks.npy"' in text
-    found = [one.source.appearance for one in parse_rig(text, tmp_path / "rig.toml").sources]
-    assert found == [tmp_path / "looks.npy"] * 4
+    named = [one.source.appearance for one in parse_rig(text, tmp_path / "rig.toml").sources]
+    assert named == [tmp_path / "looks.npy"] * 4
 
 
 @pytest.mark.parametrize(
@@ -169,12 +160,22 @@ def test_files_that_are_no_features_are_refused(tmp_path: Path, features: Floats
     assert reported in said and "\n" not in said
 
 
-def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
+def test_missing_broken_and_unequal_features_are_named(tmp_path: Path) -> None:
     wanted = source(tmp_path, np.zeros((4, 2)))
     (tmp_path / "looks.npy").write_bytes(b"no array")
     refused(FormatError, r"looks\.npy", open_stream, wanted, CAMERAS[0])
     (tmp_path / "looks.npy").unlink()
     refused(SourceError, r"looks\.npy", open_stream, wanted, CAMERAS[0])
+    sources = []
+    for k in range(4):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        sources.append(CameraSource(source(folder, np.arange(8.0 + 4 * (k == 3)).reshape(4, -1))))
+    three = Recording(tmp_path / "rig.toml", RIG, (*sources[:3], CameraSource(Source("masks", tmp_path / "m.avi"))))
+    axes = appearance_axes(three)
+    assert axes is not None and axes.shape == (2, 2)
+    refused(FormatError, "3 numbers a box", appearance_axes, Recording(tmp_path / "rig.toml", RIG, tuple(sources)))
+    assert appearance_axes(Recording(tmp_path / "rig.toml", RIG, three.sources[3:] * 4)) is None
 
 
 def test_axes_are_those_of_the_greatest_variance() -> None:
@@ -186,16 +187,3 @@ def test_axes_are_those_of_the_greatest_variance() -> None:
     assert axes.shape == (40, FEATURES)
     np.testing.assert_allclose(axes.T @ axes, np.eye(FEATURES), atol=1e-9)
     assert axes[3, 0] > 0.99 and axes[17, 1] > 0.99
-
-
-def test_cameras_whose_features_differ_in_length_are_refused(tmp_path: Path) -> None:
-    sources = []
-    for k in range(4):
-        folder = tmp_path / str(k)
-        folder.mkdir()
-        sources.append(CameraSource(source(folder, np.arange(8.0 + 4 * (k == 3)).reshape(4, -1))))
-    three = Recording(tmp_path / "rig.toml", RIG, (*sources[:3], CameraSource(Source("masks", tmp_path / "m.avi"))))
-    axes = appearance_axes(three)
-    assert axes is not None and axes.shape == (2, 2)
-    refused(FormatError, "3 numbers a box", appearance_axes, Recording(tmp_path / "rig.toml", RIG, tuple(sources)))
-    assert appearance_axes(Recording(tmp_path / "rig.toml", RIG, three.sources[3:] * 4)) is None

@@ -127,12 +127,15 @@ def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
         np.testing.assert_array_equal(whole[person], area)
 
 
-def test_outlines_outside_the_image() -> None:
+def test_outside_the_image_or_view_nothing_has_a_scale() -> None:
     ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
     table = BodyTable.of(ahead, room().grid)
     places = np.array([[-1.5, 0.0], [0.3, 1.9]])
     first, _, _ = outlines(table, places, np.array([1.7, 1.7]), 1, (96, 128))
     np.testing.assert_array_equal(first, [-1, -1])
+    detector = detector_for(2)
+    nothing = np.zeros(room().cameras[0].size[::-1], np.float32)
+    assert not scales(detector, [None, detector.observe([nothing, nothing])[1]]).any()
 
 
 CROWD = people((-1.2, -0.3, 1.75), (-0.2, 1.2, 1.6), (0.4, -1.1, 1.8))
@@ -177,12 +180,6 @@ def test_scale_is_what_the_largest_body_explains(cameras: int) -> None:
     for scale, expected in zip(found, scales_by_definition(detector, observations), strict=True):
         np.testing.assert_allclose(scale, expected, rtol=1e-4, atol=1e-3)
         assert scale.max() > 0
-
-
-def test_a_blind_view_and_an_empty_one_have_no_scale() -> None:
-    detector = detector_for(2)
-    nothing = np.zeros(room().cameras[0].size[::-1], np.float32)
-    assert not scales(detector, [None, detector.observe([nothing, nothing])[1]]).any()
 
 
 @pytest.mark.parametrize("place", [(-1.0, 0.0), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.0)])

@@ -78,7 +78,7 @@ def test_bodies_of_all_heights_are_found_by_boxes(tall: float) -> None:
 
 @compiled_only
 @pytest.mark.parametrize("kind", KINDS)
-def test_pixels_and_boxes_are_assigned_to_people(kind: str) -> None:
+def test_pixels_boxes_and_tracks_are_assigned_to_people(kind: str) -> None:
     rig = room()
     standing = people((-0.7, -0.7), (0.8, 0.8))
     explanation = room_detector(kind).explain(evidence_of(kind, rig.cameras, standing), None)
@@ -91,11 +91,20 @@ def test_pixels_and_boxes_are_assigned_to_people(kind: str) -> None:
     assert set(np.unique(explanation.pixel_assignment[2]).tolist()) == {-1, 0, 1}
     for owners in explanation.box_assignment:
         assert sorted(owners.tolist()) == ([nearest, far] if nearest < far else [far, nearest]) * (kind == "boxes")
+    # A person continues one track at most, and a track is one person at most; heights tell two apart.
+    standing = people((-0.3, 0.0, 1.8), (0.35, 0.1, 1.6), (-1.2, -1.1))
+    expected = expecting((0.05, 0.05, 1.6), (0.0, 0.05, 1.8))
+    explanation = room_detector(kind).explain(evidence_of(kind, room().cameras, standing), expected)
+    index = assert_found(explanation, standing)
+    assert explanation.people.track_index[index].tolist() == [1, 0, -1]
+    # The prior of a track is higher than that of any birth, and that of a birth inside is lower.
+    first, second, birth = explanation.people.prior[index]
+    assert min(first, second) > FEW_HEIGHTS.prior_log_odds > birth + 3
 
 
 @compiled_only
 @pytest.mark.parametrize("kind", KINDS)
-def test_one_behind_the_other_in_a_view(kind: str) -> None:
+def test_who_is_hidden_by_others_in_some_views_stays(kind: str) -> None:
     rig = room()
     standing = people((-0.5, -0.5, 1.8), (0.1, 0.1, 1.6))
     views = evidence_of(kind, rig.cameras, standing)
@@ -107,12 +116,6 @@ def test_one_behind_the_other_in_a_view(kind: str) -> None:
         assert explanation.box_assignment[0].tolist() == [nearest]
         assert explanation.people.visibility[0, far] < 0.3 < 0.9 < explanation.people.visibility[0, nearest]
         assert explanation.people.view_evidence[0, far] > -1.0  # a box that is not expected is not missed
-
-
-@compiled_only
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_person_hidden_from_all_but_two_views_stays(kind: str) -> None:
-    rig = room()
     hidden = people((0.0, 1.0, 1.6))
     nearer = people((-0.92, -0.18, 1.8), (0.93, -0.17, 1.8))  # on the lines to the first two cameras
     standing = np.concatenate([hidden, nearer])
@@ -123,7 +126,7 @@ def test_a_person_hidden_from_all_but_two_views_stays(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_empty_frame_has_no_people(kind: str) -> None:
+def test_a_track_proposes_and_a_frame_decides_empty_or_not(kind: str) -> None:
     views = evidence_of(kind, room().cameras, people())
     explanation = room_detector(kind).explain(views, None)
     assert len(explanation.people) == 0 and len(explanation.ghosts) == 0
@@ -132,10 +135,6 @@ def test_an_empty_frame_has_no_people(kind: str) -> None:
     explanation = room_detector(kind).explain(views, expecting((0.2, 0.4)))
     assert len(explanation.people) == 0 and len(explanation.ghosts) == 1
     assert explanation.ghosts.evidence[0] < 0 and explanation.people.view_evidence.shape == (4, 0)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_track_proposes_and_the_frame_decides(kind: str) -> None:
     standing = people((0.2, 0.4))
     views = evidence_of(kind, room().cameras, standing)
     assert_found(room_detector(kind).explain(views, expecting((0.25, 0.35), (-1.2, 1.1))), standing)
@@ -150,7 +149,7 @@ def only(explanation: Explanation) -> tuple[float, float, int]:
 
 @compiled_only
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_birth_costs_inside_and_not_at_the_border(kind: str) -> None:
+def test_births_cost_inside_and_nothing_in_the_first_frame(kind: str) -> None:
     """The evidence of the views stays the same; the prior does not."""
     birth_cost = FEW_HEIGHTS.birth_cost
     for place, cost in (((0.05, -0.04), birth_cost), ((-1.9, 0.1), birth_cost * 0.125)):  # half a cell from the edge
@@ -161,11 +160,6 @@ def test_a_birth_costs_inside_and_not_at_the_border(kind: str) -> None:
         assert only(first)[0] - only(later)[0] == pytest.approx(cost, abs=1e-6)
         assert only(first)[1] - only(later)[1] == pytest.approx(cost, abs=1e-6)
         assert only(first)[2] == only(later)[2] == -1
-
-
-@compiled_only
-@pytest.mark.parametrize("kind", KINDS)
-def test_births_cost_nothing_in_the_first_frame(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62), (0.1, 1.2, 1.6))
     found = room_detector(kind).explain(evidence_of(kind, room().cameras, standing), None).people
     size = np.zeros(len(found))
@@ -178,20 +172,6 @@ def test_births_cost_nothing_in_the_first_frame(kind: str) -> None:
     # Of the candidate, not yet refined.
     np.testing.assert_allclose(found.prior, FEW_HEIGHTS.prior_log_odds + size, atol=0.4)
     assert (found.prior <= FEW_HEIGHTS.prior_log_odds).all()
-
-
-@compiled_only
-@pytest.mark.parametrize("kind", KINDS)
-def test_tracks_are_assigned_to_the_people_found(kind: str) -> None:
-    """A person continues one track at most, and a track is one person at most; heights tell two apart."""
-    standing = people((-0.3, 0.0, 1.8), (0.35, 0.1, 1.6), (-1.2, -1.1))
-    expected = expecting((0.05, 0.05, 1.6), (0.0, 0.05, 1.8))
-    explanation = room_detector(kind).explain(evidence_of(kind, room().cameras, standing), expected)
-    index = assert_found(explanation, standing)
-    assert explanation.people.track_index[index].tolist() == [1, 0, -1]
-    # The prior of a track is higher than that of any birth, and that of a birth inside is lower.
-    first, second, birth = explanation.people.prior[index]
-    assert min(first, second) > FEW_HEIGHTS.prior_log_odds > birth + 3
 
 
 def test_a_track_stays_though_one_view_alone_shows_it() -> None:

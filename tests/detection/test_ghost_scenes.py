@@ -131,7 +131,7 @@ def test_a_ghost_that_moves_with_its_makers(kind: str) -> None:
         assert away.min() < 0.3
 
 
-def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
+def test_the_moving_ghost_is_borne_out_and_not_picked_up() -> None:
     """It was there to be picked up: taken by itself it is worth a person, in nearly every frame."""
     rig, worth = facing_pair(), 0
     frame_pass = detector_of(rig, "pixels")
@@ -149,10 +149,7 @@ def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
         worth += score[1, here].max() > -config.prior_log_odds
     assert worth > 0.8 * FRAMES
-
-
-def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
-    """Its cells hold the unexplained evidence, which is none: they stay free."""
+    # Its cells hold the unexplained evidence, which is none: they stay free.
     rig, radius = facing_pair(), 0.35
     for step in moving_ghosts("pixels").steps:
         for scene, label in zip(step.commit.frames, step.commit.label, strict=True):

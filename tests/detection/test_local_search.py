@@ -145,7 +145,6 @@ def members_at(ground: Floats, views: list[Singles]) -> MapEstimate:
 
 
 def pair(distance: float) -> Floats:
-    """Two places at a distance, about a point near the middle of the room; float64 (2, 2), metres."""
     return np.asarray(np.array([[0.1, -0.2]]) + np.array([[-0.5], [0.5]]) * distance * np.array([[0.8, 0.6]]))
 
 
@@ -166,21 +165,30 @@ def test_two_people_side_by_side_stay_two(distance: float) -> None:
     np.testing.assert_array_equal(merged(before).members, before.members)
 
 
-def test_two_people_half_a_metre_apart_are_found_as_two() -> None:
+def test_two_half_a_metre_apart_are_two_within_the_hard_core() -> None:
     standing = np.column_stack([pair(0.5), [1.7, 1.7]])
     found = detector().explain(likelihoods(room().cameras, standing), None).people.ground
     assert len(found) == 2
     away = np.hypot(*np.moveaxis(standing[:, None, :2] - found, -1, 0))
     assert away.min(0).max() < 0.12 and away.min(1).max() < 0.12
+    core = FEW_HEIGHTS.minimum_distance - 0.05
+    assert detector().parameters.hard_core == pytest.approx(core)
+    assert detector("pixels", "boxes", "boxes", "boxes").parameters.hard_core == pytest.approx(core)
+    assert detector(*["boxes"] * 4).parameters.hard_core == 0.0
 
 
-def test_a_third_person_is_no_part_of_a_merge() -> None:
+def test_third_far_and_boxed_members_are_no_part_of_a_merge() -> None:
     ground = np.concatenate([pair(0.3), [[1.2, 1.0]]])
     views = [
         np.maximum(*both) for both in zip(silhouettes(ground[2:], 1.0), silhouettes(pair(0.0)[:1], 1.5), strict=True)
     ]
     after = merged(members_at(ground, views))
     assert len(after.members) == 2 and 2 in after.members
+    far = members_at(pair(0.7), silhouettes(pair(0.7), 1.0))
+    assert merged(far) is far
+    seen = [boxes(camera, people(*pair(0.5))) for camera in room().cameras]
+    close_pair = estimate_of(box_detector(), seen, None, pool_at(pair(0.5)))
+    assert len(close_pair.members) == 2 and merged(close_pair) is close_pair
 
 
 @pytest.mark.parametrize(("width", "distance"), PAIRS)
@@ -196,21 +204,6 @@ def test_a_merge_is_the_better_of_both_sets_by_the_plain_score(width: float, dis
     assert after.members_score.total == pytest.approx(max(scores), abs=1e-3)
 
 
-def test_members_far_apart_and_members_in_boxes_are_left_alone() -> None:
-    far = members_at(pair(0.7), silhouettes(pair(0.7), 1.0))
-    assert merged(far) is far
-    views = [boxes(camera, people(*pair(0.5))) for camera in room().cameras]
-    close_pair = estimate_of(box_detector(), views, None, pool_at(pair(0.5)))
-    assert len(close_pair.members) == 2 and merged(close_pair) is close_pair
-
-
-def test_the_hard_core_stands_where_a_view_delivers_pixels() -> None:
-    core = FEW_HEIGHTS.minimum_distance - 0.05
-    assert detector().parameters.hard_core == pytest.approx(core)
-    assert detector("pixels", "boxes", "boxes", "boxes").parameters.hard_core == pytest.approx(core)
-    assert detector(*["boxes"] * 4).parameters.hard_core == 0.0
-
-
 def nearest_pair(ground: Floats) -> float:
     """Distance of the two nearest of some places, metres; infinite for fewer than two."""
     distance = np.hypot(*np.moveaxis(ground[:, None] - ground, -1, 0)) + np.diag(np.full(len(ground), np.inf))
@@ -224,7 +217,6 @@ def crowd(seed: int) -> Floats:
 
 
 def twins(standing: Floats) -> PredictedTracks:
-    """Two predicted tracks for each person, 0.16 m apart."""
     doubled = np.repeat(standing, 2, axis=0)
     doubled[::2, 0] -= 0.08
     doubled[1::2, 0] += 0.08
@@ -328,7 +320,7 @@ def box_tables(estimate: MapEstimate) -> list[Floats | Ints]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_more_candidates_have_the_boxes_of_a_whole_pool(seed: int) -> None:
+def test_boxes_and_places_are_those_of_the_pool_without_cache(seed: int) -> None:
     _, views, predicted = box_crowd(seed)
     partly_blind: list[Boxes | None] = [views[0], None, *views[2:]]
     before = of_tracks(partly_blind, predicted)
@@ -344,19 +336,14 @@ def test_more_candidates_have_the_boxes_of_a_whole_pool(seed: int) -> None:
     searched = before.searched_with(peaks, before.members)
     again = MapEstimate.of_search(before.evidence, searched.pool, before.members)
     np.testing.assert_array_equal(searched.members, again.members)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_refined_places_are_those_without_a_cache(seed: int) -> None:
-    """Members who take other boxes, since others are gone, are not where they were."""
-    _, views, predicted = box_crowd(seed)
+    # Members who take other boxes, since others are gone, are not where they were.
     estimate = of_tracks(views, predicted)
     refined_members(estimate)
     for one in (estimate, estimate.with_members(estimate.members[::2].copy())):
         anew = replace(one, evidence=replace(one.evidence))
-        found, by_itself = refined_members(one), refined_members(anew)
-        np.testing.assert_array_equal(found.pool.ground, by_itself.pool.ground)
-        np.testing.assert_array_equal(found.covariance, by_itself.covariance)
+        kept, by_itself = refined_members(one), refined_members(anew)
+        np.testing.assert_array_equal(kept.pool.ground, by_itself.pool.ground)
+        np.testing.assert_array_equal(kept.covariance, by_itself.covariance)
 
 
 def test_more_candidates_have_the_pixels_of_a_whole_pool() -> None:

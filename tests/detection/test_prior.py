@@ -62,7 +62,7 @@ def test_log_ratio_of_a_track_by_hand(
             assert log_ratio[j, k] == pytest.approx(track - birth, abs=1e-6)
 
 
-def test_log_density_of_a_place_up_to_a_constant() -> None:
+def test_log_density_of_a_place_and_of_no_tracks() -> None:
     expected = expecting((0.3, -0.4), (1.0, 1.0))
     points = np.array([[0.3, -0.4], [0.5, -0.4], [0.3, 0.2]])
     log_density = expected.place_log_density(np.array([1, 0]), points[[[2, 1, 0], [0, 1, 2]]])
@@ -70,9 +70,6 @@ def test_log_density_of_a_place_up_to_a_constant() -> None:
         normal = multivariate_normal(expected.ground[track], expected.covariance[track])
         by_hand = normal.logpdf(points) - normal.logpdf(expected.ground[track])
         np.testing.assert_allclose(log_density[k], by_hand[[[2, 1, 0], [0, 1, 2]][k]], atol=1e-9)
-
-
-def test_no_tracks() -> None:
     assert len(no_tracks()) == 0
     assert no_tracks().track_log_ratio(np.zeros((3, 2)), np.full(3, 1.7), BODY, CONFIG.prior_log_odds).shape == (3, 0)
     assert no_tracks().track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 0)
@@ -103,14 +100,11 @@ def test_distance_by_trying_all_cells(polygon: list[tuple[float, float]] | None,
     np.testing.assert_allclose(Border.of(rig).distance, expected, atol=1e-9)
 
 
-def test_places_that_no_view_sees_are_outside() -> None:
+def test_unseen_places_are_outside_and_births_cost_inside() -> None:
     ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
     border = Border.of(rig_of([ahead]))
     np.testing.assert_array_equal(border.away(np.array([[-1.5, 0.0], [-0.2, 1.0]])), 0.0)
     assert border.away(np.array([[1.5, 0.1]]))[0] > 0.2
-
-
-def test_a_birth_costs_away_from_the_border() -> None:
     border = Border.of(open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2)))
     places = np.array([[-2.95, 0.0], [-2.45, 0.0], [-1.95, 0.0], [0.0, 0.0], [-3.5, 0.0]])
     later = Prior.of(no_tracks(), CONFIG, BODY, border)

@@ -50,7 +50,7 @@ def test_candidates_add_what_larger_sets_score_more(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_members_have_tracks_and_boxes_of_their_own(seed: int) -> None:
+def test_members_have_tracks_boxes_and_the_nearest_pixels(seed: int) -> None:
     frame, members = scaled(random_frame(seed, 6, 3)), np.array([5, 3, 0, 1])
     _, evidence, boxes, tracks = additions(frame, members, members)
     gains = frame.birth_cost[members, None] + frame.track_gain[members]
@@ -61,10 +61,6 @@ def test_members_have_tracks_and_boxes_of_their_own(seed: int) -> None:
         match = frame.boxes.match[view, members, own]
         np.testing.assert_allclose(evidence[view][own >= 0], PARAMETERS.box_log_ratio + match[own >= 0])
         assert len(set(own[own >= 0])) == (own >= 0).sum()
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_painted_pixels_are_those_of_the_nearest(seed: int) -> None:
     frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
     pixels = frame.pixels
     for view in range(len(pixels.raster)):

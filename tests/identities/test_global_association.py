@@ -88,13 +88,16 @@ def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
     assert one.links == other.links and relinked(rows).links == one.links
 
 
-def test_a_track_is_cut_at_encounters_and_gaps() -> None:
+def test_tracks_are_cut_at_gaps_and_nothing_teaches_nothing() -> None:
     rows = rows_of(PASSING, noise=0.0)
     rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
     parts = [
         (int(rows["id"][part[0]]), *rows["frame"][part[[0, -1]]].tolist()) for part in isolated_tracklets(rows, RATE)
     ]
     assert parts == [(1, 0, 31), (1, 32, 49), (1, 53, 63), (2, 0, 31), (2, 32, 63)]
+    assert learned(walkers()[:0], np.zeros(0, APPEARANCE)).value.shape == (0, 0)
+    one = walkers()
+    assert learned(one, np.zeros(0, APPEARANCE)).value.shape == (len(one), 0)
 
 
 @drawn(100, runs(6))
@@ -184,22 +187,14 @@ def drifting(rows: Rows, noise: float, differ: float, frames: int, name: str) ->
     return looks
 
 
-def test_looks_that_last_are_believed_less_than_independent_ones() -> None:
+def test_looks_that_last_count_less_and_offsets_are_undone() -> None:
     rows = walkers()
     fresh, lasting = appearance(rows, rows["id"], 1.0, 1.0, 4), drifting(rows, 0.2, 1.0, 16, "features")
     assert learned(rows, lasting).model.row_variance.min(initial=np.inf) > learned(rows, fresh).model.row_variance.max()
-
-
-def test_a_weak_axis_lasts_as_long_as_tracklets_say() -> None:
-    """Nobody is confused by the other axes, whatever is believed of how long errors last."""
-    rows = walkers()
-    lasting = learned(rows, drifting(rows, 0.2, 3.0, 4, "colours")).model.row_variance
-    assert lasting.max() > 1.5 * lasting.min()
-
-
-def test_offsets_of_cameras_are_undone() -> None:
-    """A person whom only one camera sees for a while does not seem to change."""
-    rows = walkers()
+    # Nobody is confused by the other axes, whatever is believed of how long errors last.
+    variance = learned(rows, drifting(rows, 0.2, 3.0, 4, "colours")).model.row_variance
+    assert variance.max() > 1.5 * variance.min()
+    # A person whom only one camera sees for a while does not seem to change.
     looks = appearance(rows, rows["id"], 0.1, 1.0, 4)
     looks = looks[(looks["view"] == 0) | (looks["frame"] % 40 < 20)]
     found = learned(rows, looks)
@@ -213,7 +208,7 @@ def associated(rows: Rows, looks: Rows) -> Ints:
     return associate_globally(rows, IdentityProblem.of(rows, sizes, looks, RATE, BORDER, CONFIG)).identity
 
 
-def test_features_tell_two_apart_who_are_equally_tall() -> None:
+def test_features_tell_apart_and_are_learned_from_errors() -> None:
     """Two stand together and are swapped by the filter; four others walk by, from whom features are learned."""
     others = {k: (straight(-5, k - 1, 0.5, 0), 1.7, FRAMES) for k in range(3, 6)}
     true = committed(rows_of({1: (visit(-1), 1.70, FRAMES), 2: (visit(1), 1.70, FRAMES)} | others, noise=0.0))
@@ -223,15 +218,7 @@ def test_features_tell_two_apart_who_are_equally_tall() -> None:
         found = associated(rows, appearance(rows, true["id"], 1.0, 1.0, 4))
         apart = ~np.isin(rows["frame"], range(72, 89))
         np.testing.assert_array_equal(found[apart], true["id"][apart])
-
-
-def dance(side: float, y: float) -> Path:
-    """Two stand together every 4 s and part again."""
-    return lambda t: (side * (0.1 + abs(np.sin(np.pi * t / 4))), y)
-
-
-def test_appearance_is_learned_from_mostly_wrong_identities() -> None:
-    """Pairs of equally tall people, who are exchanged or not each time they stand together."""
+    # Pairs of equally tall people, who are exchanged or not each time they stand together.
     paths = {2 * k + side: (dance(2 * side - 1, 3.0 * k), 1.7, FRAMES) for k in range(3) for side in (0, 1)}
     rows = committed(rows_of({track + 1: path for track, path in paths.items()}))
     rng = np.random.default_rng(2)
@@ -245,7 +232,6 @@ def test_appearance_is_learned_from_mostly_wrong_identities() -> None:
     assert pairs.shape[1] == 6, (pairs, count)
 
 
-def test_without_rows_nothing_is_learned() -> None:
-    assert learned(walkers()[:0], np.zeros(0, APPEARANCE)).value.shape == (0, 0)
-    one = walkers()
-    assert learned(one, np.zeros(0, APPEARANCE)).value.shape == (len(one), 0)
+def dance(side: float, y: float) -> Path:
+    """Two stand together every 4 s and part again."""
+    return lambda t: (side * (0.1 + abs(np.sin(np.pi * t / 4))), y)

@@ -54,7 +54,7 @@ def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
     assert score(seen, names, MODEL.spread, CONFIG.motion, LONGEST) == pytest.approx(best, abs=1e-6)
 
 
-def test_names_that_are_final_early_belong_to_one_hypothesis() -> None:
+def test_early_names_are_of_one_hypothesis_and_later_ones_count() -> None:
     """With a lag too short for sizes to tell, rows of a name are still apart in time, and most names are the same."""
     rows = swapped(rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), 1.85, range(160))}), 80)
     seen = seen_of(rows)
@@ -64,10 +64,7 @@ def test_names_that_are_final_early_belong_to_one_hypothesis() -> None:
         assert len(set(zip(frame.tolist(), names.tolist(), strict=True))) == len(rows)
         assert len(set(names.tolist())) <= 4
     np.testing.assert_array_equal(found(seen, 10.0), found(seen))
-
-
-def test_what_comes_later_counts_where_a_track_is_certain() -> None:
-    """Two are exchanged by the filter while they stand together, unmeasured: both readings are kept until they part."""
+    # Two are exchanged by the filter while they stand together, unmeasured: both readings are kept until they part.
     true = rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), 1.85, range(160))}, noise=0.0)
     true["height"][(true["frame"] >= 66) & (true["frame"] < 110)] = np.nan
     true["xx"] = true["yy"] = 0.02
@@ -119,18 +116,12 @@ def test_outliers_say_no_more_against_a_person_than_they_may(most: float, low: l
     assert len(np.unique(found)) == people
 
 
-def test_noise_and_spread_of_a_size_are_learned() -> None:
+def test_noise_and_spread_of_a_size_are_learned_from_enough() -> None:
     people = np.random.default_rng(1).normal(1.7, 0.2, 60)
     model = learn_sizes(*sizes_of(people, 0.03), RATE)
     assert model.variance[0] == pytest.approx(0.03**2, rel=0.15)
     assert model.spread[0] == pytest.approx(0.2**2, rel=0.3) and model.row_variance[0] < 3 * model.variance[0]
-
-
-def test_a_size_that_is_everybodys_tells_nobody_apart() -> None:
     assert learn_sizes(*sizes_of(np.full(400, 1.7), 0.03), RATE).spread[0] < 0.012**2
-
-
-def test_few_people_keep_the_prior() -> None:
     rows = rows_of({1: (visit(-1), 1.7, range(40))})
     tracklets = isolated_tracklets(rows, RATE)
     model = learn_sizes(MeasuredSizes.of_heights(rows["height"], CONFIG), rows["frame"], tracklets, RATE)
@@ -173,17 +164,6 @@ def test_who_is_not_the_one_before_is_the_other() -> None:
     np.testing.assert_array_equal(found[APART], swapped(rows, 80)["id"][APART])
 
 
-def test_who_was_away_for_long_is_the_same_if_somebody_says_so() -> None:
-    away = CONFIG.tracking.maximum_gap + 3.0
-    rows = gone(away)
-    last, first = row(rows, 1, 23), row(rows, 2, 24 + round(away * RATE))
-    assert len(set(identities(rows, Constraints.of([], [])).tolist())) == 2
-    assert len(set(identities(rows, Constraints.of([(last, first)], [])).tolist())) == 1
-    near = gone(2.0)
-    pair = [(row(near, 1, 23), row(near, 2, 40))]
-    assert len(set(identities(near, Constraints.of([], pair)).tolist())) == 2
-
-
 @drawn(40, runs(4), st.data())
 def test_whatever_can_be_true_is_obeyed(rows: Rows, data: st.DataObject) -> None:
     """Constraints of any naming in which nobody is twice in a frame."""
@@ -201,11 +181,16 @@ def test_whatever_can_be_true_is_obeyed(rows: Rows, data: st.DataObject) -> None
     assert not constraints.violated(identities(rows, constraints)).any()
 
 
-def test_constraints_of_nobody_change_nothing() -> None:
+def test_constraints_of_nobody_and_of_no_person_are_nothing() -> None:
     rows = met(80)
     free = identities(rows, Constraints.of([], []))
     told = [(row(rows, 1, 10), row(rows, 1, 20)), (row(rows, 2, 10), row(rows, 2, 60))]
     np.testing.assert_array_equal(identities(rows, Constraints.of(told, [])), free)
+    rows = rows_of({k: (straight(-3, k, 0.5, 0), 1.7, range(40)) for k in (1, 2)})
+    answered = answered_rows(rows, [Answer("a", "delete", 2, frame=20), Answer("b", "swap", 1, 2, 20)], RATE)
+    assert answered.deleted.tolist() == ((rows["id"] == 2) & (rows["frame"] >= 20)).tolist()
+    assert len(answered.constraints) == 1
+    assert len(answered_rows(rows, [Answer("b", "swap", 1, 2, 20)], RATE).constraints) == 2
 
 
 def bound(rows: Rows, *answers: Answer) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
@@ -216,7 +201,7 @@ def bound(rows: Rows, *answers: Answer) -> tuple[list[tuple[int, ...]], list[tup
     return [pair for pair, same in pairs if same], [pair for pair, same in pairs if not same]
 
 
-def test_answers_bind_rows_apart_and_ends_of_gaps() -> None:
+def test_answers_bind_rows_gaps_and_who_was_away_for_long() -> None:
     rows = met()
     away = 2 * np.abs(rows["x"][rows["id"] == 1])
     last, first = int(np.flatnonzero(away[:80] >= 0.8)[-1]), 80 + int(np.flatnonzero(away[80:] >= 0.8)[0])
@@ -227,14 +212,14 @@ def test_answers_bind_rows_apart_and_ends_of_gaps() -> None:
     assert bound(rows, Answer("a", "join", 1, 2)) == ([(1, 23, 2, 40)], [])
     assert bound(rows, Answer("a", "keep", 1, 2, 30)) == ([], [(1, 23, 2, 40)])
     assert bound(rows, Answer("a", "keep", 1, frame=10)) == ([], [])
-
-
-def test_who_is_no_person_binds_nothing() -> None:
-    rows = rows_of({k: (straight(-3, k, 0.5, 0), 1.7, range(40)) for k in (1, 2)})
-    told = answered_rows(rows, [Answer("a", "delete", 2, frame=20), Answer("b", "swap", 1, 2, 20)], RATE)
-    assert told.deleted.tolist() == ((rows["id"] == 2) & (rows["frame"] >= 20)).tolist()
-    assert len(told.constraints) == 1
-    assert len(answered_rows(rows, [Answer("b", "swap", 1, 2, 20)], RATE).constraints) == 2
+    absence = CONFIG.tracking.maximum_gap + 3.0
+    rows = gone(absence)
+    last, first = row(rows, 1, 23), row(rows, 2, 24 + round(absence * RATE))
+    assert len(set(identities(rows, Constraints.of([], [])).tolist())) == 2
+    assert len(set(identities(rows, Constraints.of([(last, first)], [])).tolist())) == 1
+    near = gone(2.0)
+    pair = [(row(near, 1, 23), row(near, 2, 40))]
+    assert len(set(identities(near, Constraints.of([], pair)).tolist())) == 2
 
 
 def solved(run: Path, output: Path, *answers: str) -> Run:
@@ -279,15 +264,12 @@ def test_a_second_correction_keeps_earlier_answers(undisturbed: Path, tmp_path: 
     refused(InputError, "contradicts others", solved, one, tmp_path / "back.h5", "swap,20,1,2,")
 
 
-def test_rows_that_are_not_there_are_refused(undisturbed: Path, tmp_path: Path) -> None:
+def test_missing_rows_and_answers_that_cannot_be_are_refused(undisturbed: Path, tmp_path: Path) -> None:
     new = tmp_path / "new.h5"
     solved(undisturbed, new, "swap,20,1,2,")
     with h5py.File(new, "r+") as file:
         file["answers"][0] = (10**6, 10**6 + 1, 1)
     refused(FormatError, "/answers: found row 1000001", solved, new, tmp_path / "more.h5", "swap,20,1,2,")
-
-
-def test_answers_that_cannot_all_be_true_are_refused(undisturbed: Path, tmp_path: Path) -> None:
-    new = tmp_path / "new.h5"
-    refused(InputError, "contradicts others", solved, undisturbed, new, "swap,20,1,2,", "keep,20,1,2,")
-    assert not new.exists()
+    other = tmp_path / "other.h5"
+    refused(InputError, "contradicts others", solved, undisturbed, other, "swap,20,1,2,", "keep,20,1,2,")
+    assert not other.exists()

@@ -43,22 +43,16 @@ def in_windows(rows: Rows, config: Config, fresh: Callable[[], int]) -> Rows:
     return np.concatenate([live.decide(window, NOTHING, fresh) for window in windows])
 
 
-def test_who_was_lost_and_found_gets_the_first_id_back() -> None:
+def test_who_is_found_gets_the_first_id_back_in_time() -> None:
     rows = np.concatenate([walk(1, 0, 45), walk(2, 52, 100), walk(3, 0, 100, 3.0)])
     found = in_windows(rows, Config(live=LiveConfig(correction_interval=2.0)), count(4).__next__)
     named = corrected_ids(rows, found)
     assert set(named["id"][rows["y"] == 0.0].tolist()) == {1}
     assert set(named["id"][rows["y"] == 3.0].tolist()) == {3}
     assert found["decision_frame"].min() < 80
-
-
-def test_nothing_is_decided_before_the_interval_is_over() -> None:
     rows = np.concatenate([walk(1, 0, 45), walk(2, 52, 80)])
     for interval in (20.0, 0.0):
         assert len(in_windows(rows, Config(live=LiveConfig(correction_interval=interval)), count(3).__next__)) == 0
-
-
-def test_memory_ends() -> None:
     live = LiveCorrections(RATE, BORDER, Config(live=LiveConfig(correction_memory=4.0)))
     for first in range(0, 100, 20):
         live.decide(walk(1, first, first + 20), NOTHING, count(2).__next__)
@@ -76,7 +70,7 @@ def test_no_id_stands_twice_in_a_frame(seed: int) -> None:
     assert len(np.unique(np.stack([named["frame"], named["id"]]), axis=1).T) == len(named)
 
 
-def test_corrections_of_one_decision_hold_at_once() -> None:
+def test_corrections_hold_at_once_and_ids_go_on_corrected() -> None:
     rows = np.concatenate([walk(1, 0, 60), walk(2, 0, 60, 1.0)])
     exchanged = corrected_ids(rows, EXCHANGE)
     within = (rows["frame"] >= 20) & (rows["frame"] <= 50)
@@ -84,9 +78,6 @@ def test_corrections_of_one_decision_hold_at_once() -> None:
     later = EXCHANGE.copy()
     later["decision_frame"] = 60
     np.testing.assert_array_equal(corrected_ids(rows, np.concatenate([EXCHANGE, later]))["id"], rows["id"])
-
-
-def test_ids_go_on_as_corrected_and_lost_tracks_leave_used_ones() -> None:
     assert renamed({10: 1, 11: 2, 12: 5}, EXCHANGE, {10, 11}) == {10: 2, 11: 1, 12: 5}
     found_again = np.array([(50, 40, 50, 7, 1)], CORRECTION)
     assert renamed({10: 1, 20: 7}, found_again, {20}) == {20: 1}

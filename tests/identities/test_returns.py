@@ -41,25 +41,19 @@ def found(visits: Visits, least: float = 0.9) -> dict[int, int]:
     return {one.visit: one.identity for one in find_returns(visits, SPREAD, least)}
 
 
-def test_those_who_come_back_are_known_however_often() -> None:
+def test_returns_are_known_surely_and_of_two_the_likelier() -> None:
     stays = ((0, 0, 9), (1, 5, 20), (0, 30, 40), (2, 35, 50), (1, 60, 70), (0, 60, 80), (3, 75, 90))
     assert found(visits_of(*stays)) == {13: 11, 15: 12, 16: 11}
     assert found(visits_of((0, 0, 30), (0, 30, 40), (0, 10, 20))) == {}, "nobody comes back while there"
     assert found(visits_of((0, 0, 30), (0, 31, 40))) == {12: 11}
-
-
-def test_a_return_tells_when_and_how_surely() -> None:
     (one,) = find_returns(visits_of((0, 0, 9), (1, 2, 60), (0, 30, 40)), SPREAD, 0.9)
     assert (one.frame, one.identity, one.visit, one.absence) == (30, 11, 13, 21) and 0.9 < one.probability < 1
-
-
-def test_of_two_who_come_together_the_likelier_one_is_known() -> None:
-    """Alone the stranger would be taken for the one who left; with the one who left beside, nobody is sure."""
+    # Alone the stranger would be taken for the one who left; with the one who left beside, nobody is sure.
     near = PEOPLE.copy()
     near[1] = near[0] + [0.4, 0.0, 0.0]
-    stays = ((0, 0, 9), (1, 30, 40), (0, 35, 50))
-    assert found(visits_of(*stays[:2], people=near, seed=None)) == {12: 11}
-    assert found(visits_of(*stays, people=near, seed=None)) == {}
+    both = ((0, 0, 9), (1, 30, 40), (0, 35, 50))
+    assert found(visits_of(*both[:2], people=near, seed=None)) == {12: 11}
+    assert found(visits_of(*both, people=near, seed=None)) == {}
 
 
 def test_the_probability_is_right_in_the_mean() -> None:
@@ -78,16 +72,20 @@ def test_the_probability_is_right_in_the_mean() -> None:
     assert np.mean(np.array(right)[share]) == pytest.approx(np.mean(np.array(stated)[share]), abs=0.08)
 
 
-def test_a_size_that_says_nothing_knows_nobody() -> None:
+def test_sizes_that_say_nothing_and_people_known_as_two() -> None:
     seen = visits_of((0, 0, 9), (0, 30, 40))
     (one,) = find_returns(seen, np.zeros(3), 0.0)
     assert one.probability == pytest.approx(0.5)
-
-
-def test_known_to_be_two_people() -> None:
     seen = visits_of((0, 0, 9), (0, 30, 40), (0, 50, 60))
     apart = [(one.visit, one.identity) for one in find_returns(seen, SPREAD, 0.6, np.array([[12, 11]]))]
     assert (12, 11) not in apart
+
+
+def test_visits_are_in_order_and_new_by_default() -> None:
+    seen = pooled_visits(np.array([7, 3, 7, 0]), np.array([4, 5, 2, 1]), np.ones((4, 1)), np.ones((4, 1)))
+    assert [seen.identity.tolist(), seen.first.tolist(), seen.last.tolist()] == [[7, 3], [2, 5], [4, 5]]
+    assert len(pooled_visits(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2)))) == 0
+    assert set(whole(CONFIG).identity.tolist()) == {1, 2, 3, 4, 5, 6}
 
 
 def test_errors_that_last_a_visit_are_learned_from_its_halves() -> None:
@@ -100,12 +98,6 @@ def test_errors_that_last_a_visit_are_learned_from_its_halves() -> None:
     halves = np.full((1, 2, 1), 4.0)
     assert lasting_variance(halves, np.array([[[4.0], [-4.0]]])) == pytest.approx([(4 - 0.5) / 2])
     assert lasting_variance(np.zeros((1, 2, 1)), np.zeros((1, 2, 1))) == [0.0]
-
-
-def test_visits_are_in_the_order_of_time() -> None:
-    seen = pooled_visits(np.array([7, 3, 7, 0]), np.array([4, 5, 2, 1]), np.ones((4, 1)), np.ones((4, 1)))
-    assert [seen.identity.tolist(), seen.first.tolist(), seen.last.tolist()] == [[7, 3], [2, 5], [4, 5]]
-    assert len(pooled_visits(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2)))) == 0
 
 
 def scene() -> tuple[Rows, Rows, Rows]:
@@ -132,10 +124,6 @@ def returning(least: float) -> Config:
     return replace(CONFIG, tracking=replace(CONFIG.tracking, return_probability=least))
 
 
-def test_whoever_comes_is_new_by_default() -> None:
-    assert set(whole(CONFIG).identity.tolist()) == {1, 2, 3, 4, 5, 6}
-
-
 def test_who_comes_back_has_one_id_and_the_events_say_so() -> None:
     before, after = whole(CONFIG), whole(returning(0.99))
     assert set(after.identity.tolist()) == {1, 2, 3, 4, 5}
@@ -151,14 +139,11 @@ def test_who_comes_back_has_one_id_and_the_events_say_so() -> None:
     assert own["reason"][1].endswith(b"s away")
 
 
-def test_an_answer_that_they_are_two_is_obeyed() -> None:
+def test_an_answer_that_they_are_two_or_split_is_obeyed() -> None:
     rows, *_ = scene()
     last, first = np.flatnonzero(rows["id"] == 1)[-1], np.flatnonzero(rows["id"] == 6)[0]
     two = Constraints.of([], [(int(last), int(first))])
     assert set(whole(returning(0.99), two).identity.tolist()) == {1, 2, 3, 4, 5, 6}
-
-
-def test_who_came_back_can_be_split_where_they_came() -> None:
     rows, *_ = scene()
     rows["id"] = whole(returning(0.99)).identity
     for frame in (100, 150, 180):

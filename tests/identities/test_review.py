@@ -37,7 +37,7 @@ def encounter(first: float, second: float) -> Rows:
     return np.concatenate([walk(1, 0, x, 0.0, first), walk(2, 0, -x, 0.2, second)])
 
 
-def test_alike_people_are_more_doubtful_than_different_ones() -> None:
+def test_alike_people_and_impossible_swaps_are_doubtful() -> None:
     margins = []
     for heights in ((1.6, 1.9), (1.75, 1.75)):
         rows = encounter(*heights)
@@ -45,9 +45,6 @@ def test_alike_people_are_more_doubtful_than_different_ones() -> None:
         assert (doubt.question, doubt.track, doubt.other, doubt.first, doubt.last) == ("encounter", 1, 2, 46, 54)
         margins.append(doubt.margin)
     assert margins[0] > margins[1] > 0
-
-
-def test_a_swap_that_motion_denies_comes_first() -> None:
     rows = encounter(1.75, 1.75)
     later = rows["frame"] > 50
     rows["id"][later] = 3 - rows["id"][later]
@@ -55,7 +52,15 @@ def test_a_swap_that_motion_denies_comes_first() -> None:
     assert doubt.margin < 0
 
 
-def test_gaps_and_weak_tracks_are_asked_about() -> None:
+def test_gaps_weak_tracks_and_those_at_one_time_are_asked() -> None:
+    lots = np.random.default_rng(2)
+    spans = {int(k): np.sort(lots.integers(0, 60, 2)) for k in lots.permutation(30) + 1}
+    tracks = {k: walk(k, int(first), np.zeros(last - first + 1), 0.0, 1.7) for k, (first, last) in spans.items()}
+    together = [
+        (a, b) for a in range(1, 31) for b in range(a + 1, 31)
+        if spans[a][0] <= spans[b][1] and spans[b][0] <= spans[a][1]
+    ]  # fmt: skip
+    assert 0 < len(together) < 435 and list(_together(tracks)) == together
     rows = np.concatenate(
         [walk(1, 0, np.linspace(-4.8, 0, 61), 0.0, 1.7), walk(2, 70, np.linspace(0.7, 4.8, 61), 0.0, 1.7),
          walk(3, 20, np.linspace(2, 2.2, 10), 3.0, 1.7, 0.5)]
@@ -63,27 +68,13 @@ def test_gaps_and_weak_tracks_are_asked_about() -> None:
     doubts = find_doubts(rows, 10.0, BORDER)
     assert {(one.question, one.track, one.other) for one in doubts} >= {("gap", 1, 2), ("false", 3, 0)}
     assert find_doubts(rows[:0], 10.0, BORDER) == []
-
-
-def test_who_appears_beside_a_track_may_be_who_that_was() -> None:
-    """The filter's track 1 passes on to somebody else, and track 2 begins where its person is."""
+    # The filter's track 1 passes on to somebody else, and track 2 begins where its person is.
     rows = np.concatenate(
         [walk(1, 0, np.linspace(-4, 0, 51), 0.0, 1.7), walk(1, 51, np.linspace(1.2, 1.3, 5), 1.2, 1.7),
          walk(2, 51, np.linspace(0.08, 4, 50), 0.0, 1.7)]
     )  # fmt: skip
     doubts = find_doubts(rows, 10.0, BORDER)
     assert ("birth", 1, 2, 50, 51) in {(one.question, one.track, one.other, one.first, one.last) for one in doubts}
-
-
-def test_tracks_that_are_there_at_one_time_are_compared() -> None:
-    lots = np.random.default_rng(2)
-    spans = {int(k): np.sort(lots.integers(0, 60, 2)) for k in lots.permutation(30) + 1}
-    rows = {k: walk(k, int(first), np.zeros(last - first + 1), 0.0, 1.7) for k, (first, last) in spans.items()}
-    together = [
-        (a, b) for a in range(1, 31) for b in range(a + 1, 31)
-        if spans[a][0] <= spans[b][1] and spans[b][0] <= spans[a][1]
-    ]  # fmt: skip
-    assert 0 < len(together) < 435 and list(_together(rows)) == together
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
@@ -166,9 +157,11 @@ def test_swap_join_split_delete_and_name() -> None:
     assert of(solve_corrections(three, []), 0, 5) == [0]
 
 
-def test_a_swap_where_one_track_ends_hands_its_identity_over() -> None:
+def test_a_swap_at_an_end_hands_over_and_it_is_joined_once() -> None:
     solved = solve_corrections(tracks((0, 99), (60, 99)), [Answer("a", "swap", 1, 2, 60)])
     assert of(solved, 1, 59, 60) == [1, 2] and of(solved, 2, 60) == [1]
+    with pytest.raises(InputError, match="joined already"):
+        solve_corrections(tracks((0, 9), (20, 29), (20, 29)), [Answer("a", "join", 1, 2), Answer("b", "join", 1, 3)])
 
 
 @pytest.mark.parametrize(
@@ -185,12 +178,7 @@ def test_answers_that_cannot_be_are_named(answer: Answer, message: str) -> None:
     refused(InputError, message, solve_corrections, TWO, [answer])
 
 
-def test_an_end_is_joined_once() -> None:
-    with pytest.raises(InputError, match="joined already"):
-        solve_corrections(tracks((0, 9), (20, 29), (20, 29)), [Answer("a", "join", 1, 2), Answer("b", "join", 1, 3)])
-
-
-def test_the_command_leaves_the_run_and_its_volume_alone(tmp_path: Path) -> None:
+def test_the_command_leaves_the_run_and_names_go_through(tmp_path: Path) -> None:
     run = write_small_run(tmp_path / "run.h5")
     before = run.read_bytes()
     answers = tmp_path / "answers.csv"
@@ -206,10 +194,6 @@ def test_the_command_leaves_the_run_and_its_volume_alone(tmp_path: Path) -> None
     np.testing.assert_array_equal(label, np.array([0, 2, 1])[label_before])
     with h5py.File(tmp_path / "new.h5") as file:
         assert file["provenance/answers"].asstr()[()].startswith("action,frame")
-
-
-def test_names_go_through_exports_and_report(tmp_path: Path) -> None:
-    run = write_small_run(tmp_path / "run.h5")
     (tmp_path / "names.csv").write_text('id,name\n2,"Bo, the <second>"\n')
     export(run, to="csv", output=tmp_path / "t.csv", names=tmp_path / "names.csv")
     lines = (tmp_path / "t.csv").read_text().splitlines()

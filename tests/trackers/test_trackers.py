@@ -40,7 +40,6 @@ def scene(follow: TrackingMethod, frame: int, *places: tuple[float, float]) -> F
 
 
 def crossing(frame: int) -> list[tuple[float, float]]:
-    """Two people who pass each other."""
     return [(-1.5 + 0.08 * frame, -0.5), (1.5 - 0.08 * frame, 0.4)]
 
 
@@ -79,9 +78,17 @@ def test_windows_are_those_of_the_run(first: int, frames: int) -> None:
     assert (rows["energy"] < 0).all() and (rows["energy_quantum"] == QUANTUM).all()
 
 
-def test_no_frames_no_commits() -> None:
+def test_no_frames_no_commits_and_unknown_trackers() -> None:
     for tracker in TRACKERS:
         assert find_tracker(tracker)(RIG, CONFIG, 3).finish() == []
+    refused(ConfigError, "cut, frames", find_tracker, "magic")
+
+
+def test_nearest_person_within_reach() -> None:
+    standing = np.array([[0.0, 0.0], [1.0, 0.0]])
+    asked = np.array([[[0.1, 0.0], [0.6, 0.0]], [[0.5, 2.0], [1.0, 0.4]]])
+    assert nearest_person(asked, standing, 0.4).tolist() == [[0, 1], [-1, 1]]
+    assert nearest_person(asked, np.zeros((0, 2)), 0.4).tolist() == [[-1, -1], [-1, -1]]
 
 
 @pytest.mark.parametrize("tracker", COLOURLESS)
@@ -125,7 +132,7 @@ def test_what_is_committed_early_does_not_change() -> None:
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_who_touches_is_cut_apart() -> None:
+def test_the_cut_parts_who_touches_and_makes_nobody_of_noise() -> None:
     """Two walk side by side, in one piece of occupied cells; one of them is not detected for three frames."""
     follow = find_tracker("cut")(RIG, CONFIG, 0)
     commits: list[Commit] = []
@@ -142,22 +149,8 @@ def test_who_touches_is_cut_apart() -> None:
         assert abs(row["y"] - (-0.25 if row["id"] == 1 else 0.3)) < 0.15
         own = RIG.grid.ground[(labels[row["frame"]] == row["id"]).any(0)]
         assert (own[:, 1] < 0.1).all() if row["id"] == 1 else (own[:, 1] > -0.1).all()
-
-
-@pytest.mark.parametrize("tracker", COLOURLESS)
-def test_frames_without_people(tracker: str) -> None:
-    follow = find_tracker(tracker)(RIG, CONFIG, 0)
-    commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame), UNSEEN)]
-    commits += follow.finish()
-    assert sum(len(commit.frames) for commit in commits) == 20
-    assert not any(commit.label.any() for commit in commits) and len(rows_of(commits)) == 0
-    assert len(follow.predict(20) or ()) == 0
-
-
-def test_the_cut_does_not_make_people_of_passing_noise() -> None:
-    """A cell that flickers for one frame is nobody: the pass saw nobody there."""
-    follow = find_tracker("cut")(RIG, CONFIG, 0)
-    commits: list[Commit] = []
+    # A cell that flickers for one frame is nobody: the pass saw nobody there.
+    follow, commits = find_tracker("cut")(RIG, CONFIG, 0), []
     for frame in range(10):
         noisy = scene(follow, frame, (-1.0, -1.0))
         if frame == 4:
@@ -168,8 +161,14 @@ def test_the_cut_does_not_make_people_of_passing_noise() -> None:
 
 
 @pytest.mark.parametrize("tracker", COLOURLESS)
-def test_whom_a_tracker_expects(tracker: str) -> None:
-    """Everybody seen so far, where they are now: what is carried is not what was committed, but what was seen."""
+def test_frames_without_people_and_whom_a_tracker_expects(tracker: str) -> None:
+    follow = find_tracker(tracker)(RIG, CONFIG, 0)
+    commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame), UNSEEN)]
+    commits += follow.finish()
+    assert sum(len(commit.frames) for commit in commits) == 20
+    assert not any(commit.label.any() for commit in commits) and len(rows_of(commits)) == 0
+    assert len(follow.predict(20) or ()) == 0
+    # Everybody seen so far, where they are now: what is carried is not what was committed, but what was seen.
     follow = find_tracker(tracker)(RIG, CONFIG, 0)
     assert follow.predict(0) is None
     for frame in range(LENGTH + 2):
@@ -202,18 +201,7 @@ def test_without_colour_a_tracker_says_what_it_lacks(tracker: str) -> None:
         refused(SourceError, said, method.add, frame_of(3, people((0.0, 0.0))), seen)
 
 
-def test_an_unknown_tracker_is_refused() -> None:
-    refused(ConfigError, "cut, frames", find_tracker, "magic")
-
-
-def test_nearest_person_within_reach() -> None:
-    standing = np.array([[0.0, 0.0], [1.0, 0.0]])
-    asked = np.array([[[0.1, 0.0], [0.6, 0.0]], [[0.5, 2.0], [1.0, 0.4]]])
-    assert nearest_person(asked, standing, 0.4).tolist() == [[0, 1], [-1, 1]]
-    assert nearest_person(asked, np.zeros((0, 2)), 0.4).tolist() == [[-1, -1], [-1, -1]]
-
-
-def test_rows_are_sorted_by_id() -> None:
+def test_rows_are_sorted_and_hold_events_and_views() -> None:
     ground: Floats = np.array([[1.0, 2.0], [3.0, 4.0]])
     covariance = np.array([[[0.1, 0.02], [0.02, 0.3]]] * 2)
     ids, height = np.array([9, 4]), np.array([1.7, 1.8])
@@ -223,15 +211,9 @@ def test_rows_are_sorted_by_id() -> None:
     assert rows[["x", "y", "z", "xx", "xy", "yy", "views"]].tolist()[0] == (3.0, 4.0, 0.0, 0.1, 0.02, 0.3, 3)
     np.testing.assert_allclose(rows["height"], [1.8, 1.7], rtol=1e-6)
     np.testing.assert_allclose(rows["width"], [0.45, 0.425], rtol=1e-6)
-
-
-def test_views_at_places() -> None:
-    rig = replace(RIG, cameras=(replace(RIG.cameras[0], size=(60, 45)), *RIG.cameras[1:]))
-    seen = Sampling.of(rig, "point").views().max(0).reshape(-1).tolist()
-    assert views_at(rig, rig.grid.ground.reshape(-1, 2)).tolist() == seen and set(seen) == {3, 4}
-
-
-def test_events_in_rows() -> None:
     rows = event_rows([(3, "hand-over", 5, 0, "found again after 2 unseen frames")])
     assert rows.tolist() == [(3, b"hand-over", 5, 0, b"found again after 2 unseen frames")]
     assert len(event_rows([])) == 0
+    rig = replace(RIG, cameras=(replace(RIG.cameras[0], size=(60, 45)), *RIG.cameras[1:]))
+    seen = Sampling.of(rig, "point").views().max(0).reshape(-1).tolist()
+    assert views_at(rig, rig.grid.ground.reshape(-1, 2)).tolist() == seen and set(seen) == {3, 4}

@@ -55,7 +55,7 @@ def test_a_route_is_a_way_through_time(stops: tuple[tuple[float, float, float], 
     refused(ConfigError, "routes: found 1, expected none, or 2", replace, standing(), people=2)
 
 
-def test_who_stands_stands_and_who_walks_swings_and_looks_ahead() -> None:
+def test_people_stand_swing_look_ahead_and_cross_closely() -> None:
     crowds = list(walk_routes(standing((1.6, 1.8))))
     assert [len(crowd.id) for crowd in crowds] == [2] * 21 + [0] * 9
     still, walking = crowds[4], crowds[15]
@@ -65,6 +65,8 @@ def test_who_stands_stands_and_who_walks_swings_and_looks_ahead() -> None:
     np.testing.assert_allclose(walking.swing, 1, atol=1e-9)
     np.testing.assert_allclose(walking.heading, 0, atol=1e-9)
     np.testing.assert_array_equal(walking.height, [1.6, 1.8])
+    for pair in ((1, 2), (3, 4), (5, 6), (5, 7)):
+        assert min(apart(NAMED["crossing"], *pair).values()) < 0.5
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -80,11 +82,6 @@ def test_nobody_walks_through_anybody_or_faster_than_people_walk(name: str) -> N
         for person in now.keys() & before.keys():
             assert np.hypot(*(now[person] - before[person])) * spec.frame_rate < 1.5
         before = now
-
-
-def test_people_cross_at_less_than_half_a_metre() -> None:
-    for pair in ((1, 2), (3, 4), (5, 6), (5, 7)):
-        assert min(apart(NAMED["crossing"], *pair).values()) < 0.5
 
 
 @pytest.mark.parametrize("name", ["meeting", "meeting_heights"])
@@ -162,7 +159,6 @@ def same(track: int, _: int) -> int:
 
 
 def plain(touching: list[set[tuple[int, int]]], names: list[int], parting: int) -> list[tuple[int, bytes, int, int]]:
-    """The definition, frame by frame."""
     found = []
     for a, b in {tuple(sorted((names[i], names[j]))) for pairs in touching for i, j in pairs}:
         frames = [f for f, met in enumerate(touching) if {a, b} in [{names[i], names[j]} for i, j in met]]
@@ -187,14 +183,7 @@ def test_encounters_do_not_depend_on_the_windows(
     assert found[["frame", "kind", "id", "other"]].tolist() == plain(touching, names, parting)
 
 
-def test_an_encounter_says_how_long_it_was() -> None:
-    touching = [{(0, 1)} if 3 <= f < 13 and f != 8 else set() for f in range(LENGTH)]
-    merge, split = encounters(told(touching, [1, 2, 3, 4], [6]), same, 2, RATE, LENGTH - 1)
-    assert (merge["frame"], merge["reason"]) == (3, b"their cells touch, for 2.0 s")
-    assert split["frame"] == 13
-
-
-def test_encounters_are_under_new_names_and_never_with_oneself() -> None:
+def test_encounters_are_under_new_names_and_of_their_length() -> None:
     touching = [{(0, 1), (2, 3)} if f < 10 else set() for f in range(LENGTH)]
     rows = told(touching, [1, 2, 3, 4], [5])
 
@@ -204,6 +193,10 @@ def test_encounters_are_under_new_names_and_never_with_oneself() -> None:
     found = encounters(rows, name, 2, RATE, LENGTH - 1)
     assert [(f, i, o) for f, kind, i, o, _ in found.tolist() if kind == b"merge"] == [(0, 2, 9), (5, 2, 6)]
     assert not len(encounters(rows, lambda _, __: 0, 2, RATE, LENGTH - 1))
+    touching = [{(0, 1)} if 3 <= f < 13 and f != 8 else set() for f in range(LENGTH)]
+    merge, split = encounters(told(touching, [1, 2, 3, 4], [6]), same, 2, RATE, LENGTH - 1)
+    assert (merge["frame"], merge["reason"]) == (3, b"their cells touch, for 2.0 s")
+    assert split["frame"] == 13
 
 
 FIRST, PLACES = 7, [(0.1, 0.0), (-0.2, 0.5), (1.02, 0.2), (-0.4, -1.01)]
@@ -226,11 +219,7 @@ def commit_of(rig: Rig) -> Commit:
 
 @pytest.mark.parametrize(
     ("polygon", "closed", "inside"),
-    [
-        (None, False, [[1, 2], [1, 2, 3]]),
-        (TRIANGLE, False, [[1], [1, 3]]),
-        (None, True, [[1, 2, 3, 4], [1, 2, 3, 4]]),
-    ],
+    [(None, False, [[1, 2], [1, 2, 3]]), (TRIANGLE, False, [[1], [1, 3]]), (None, True, [[1, 2, 3, 4], [1, 2, 3, 4]])],
     ids=["rectangle", "polygon", "closed"],
 )
 def test_rows_and_labels_are_of_people_inside(polygon: Floats | None, closed: bool, inside: list[list[int]]) -> None:

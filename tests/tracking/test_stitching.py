@@ -63,7 +63,7 @@ def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> 
         assert part.first == part.lead or part.first in ends
 
 
-def test_a_track_keeps_its_name_over_a_seam() -> None:
+def test_tracks_keep_names_over_seams_and_of_the_longest() -> None:
     first = np.concatenate([standing(1, range(20), 0.0), standing(2, range(20), 4.0)])
     later = np.concatenate([standing(1, range(15, 40), 4.1), standing(2, range(15, 40), 0.1)])
     joined = stitched((first, events((0, "birth", 1, 0))), (later, events((25, "merge", 1, 2))))
@@ -71,6 +71,12 @@ def test_a_track_keeps_its_name_over_a_seam() -> None:
     assert joined.committed["id"].tolist() == [1] * 20 + [2] * 20 + [2] * 20 + [1] * 20
     assert joined.local.tolist() == [1] * 20 + [2] * 20 + [1] * 20 + [2] * 20
     assert joined.events[["frame", "kind", "id", "other"]].tolist() == [(0, b"birth", 1, 0), (25, b"merge", 2, 1)]
+    later = np.concatenate([standing(1, range(15, 40), 0.0), standing(2, range(15, 19), 5.0)])
+    joined = stitched((standing(1, range(20), 0.0), events()), (later, events()))
+    assert np.unique(joined.committed["id"]).tolist() == [1] and len(joined.events) == 0
+    both = np.concatenate([standing(1, range(17, 40), 0.2), standing(2, range(10, 40), -0.2)])
+    joined = stitched((standing(1, range(20), 0.0), events()), (both, events()))
+    assert joined.committed["id"][joined.local == 2].tolist()[-1] == 1
 
 
 @pytest.mark.parametrize(
@@ -90,15 +96,6 @@ def test_seams_of_unclaimed_tracks(first: tuple[Rows, Rows], later: tuple[Rows, 
     joined = stitched(first, later)
     assert np.unique(joined.committed["id"]).tolist() == [1, 2]
     assert [(e["frame"], e["kind"], e["id"]) for e in joined.events] == [(told[0], b"death", 1), (told[1], b"birth", 2)]
-
-
-def test_tracks_of_a_warm_up_and_the_one_shared_longest() -> None:
-    later = np.concatenate([standing(1, range(15, 40), 0.0), standing(2, range(15, 19), 5.0)])
-    joined = stitched((standing(1, range(20), 0.0), events()), (later, events()))
-    assert np.unique(joined.committed["id"]).tolist() == [1] and len(joined.events) == 0
-    both = np.concatenate([standing(1, range(17, 40), 0.2), standing(2, range(10, 40), -0.2)])
-    joined = stitched((standing(1, range(20), 0.0), events()), (both, events()))
-    assert joined.committed["id"][joined.local == 2].tolist()[-1] == 1
 
 
 @drawn(

@@ -80,7 +80,7 @@ def test_a_posterior_that_says_nothing_new_changes_nothing() -> None:
     assert (after.height, after.width) == pytest.approx((track.height, track.width))
 
 
-def test_sizes_converge() -> None:
+def test_sizes_converge_and_what_frames_tell_is_used_once() -> None:
     """They are properties of the person: the mean of what the frames say, and ever surer."""
     noise, rng = 0.05, np.random.default_rng(2)
     seen = rng.normal(1.83, noise, 60)
@@ -96,20 +96,17 @@ def test_sizes_converge() -> None:
     assert track.width == pytest.approx((0.42 / 0.04**2 + weight * (seen.mean() - 1.4)) / (1 / 0.04**2 + weight))
     later = track.predicted(4.0, CONFIG.motion)  # shoes, stoop, lens, clothes
     assert later.height_variance > track.height_variance and later.width_variance > track.width_variance
-
-
-def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
-    """The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in."""
+    # The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in.
     track_filter = TrackFilter(RATE, CONFIG)
     tracks = found(people((0.0, 0.0, 1.85)))
     nothing = replace(tracks, sizes=Sizes.of_population(1, CONFIG.body))
     track_filter.update(0, tracks, GHOSTS)
-    sure = track_filter.tracks[0]
+    known = track_filter.tracks[0]
     for frame in range(1, 40):
         track_filter.update(frame, replace(nothing, track_index=np.zeros(1, np.int64)), GHOSTS)
     (track,) = track_filter.tracks
-    assert track.height == pytest.approx(sure.height, abs=1e-3)
-    assert track.height_variance > sure.height_variance
+    assert track.height == pytest.approx(known.height, abs=1e-3)
+    assert track.height_variance > known.height_variance
 
 
 def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[list[list[int]], TrackFilter]:
@@ -137,7 +134,7 @@ def except_for(way: Way, unseen: range) -> Way:
     return lambda f: None if f in unseen else way(f)
 
 
-def test_who_walks_on_is_expected_where_they_will_be() -> None:
+def test_walkers_are_expected_ahead_and_after_empty_frames() -> None:
     _, track_filter = follow([walk(-3, 1, 1.2, -0.4)], range(20))
     for ahead in (20, 24):
         expected = track_filter.predict(ahead)
@@ -146,6 +143,11 @@ def test_who_walks_on_is_expected_where_they_will_be() -> None:
         np.testing.assert_allclose(expected.ground, there, atol=0.03)
     (track,) = track_filter.tracks
     np.testing.assert_allclose(track.state[2:4], [1.2, -0.4], atol=0.03)
+    track_filter = TrackFilter(RATE, CONFIG)
+    assert track_filter.predict(0) is None and track_filter.update(0, GHOSTS, GHOSTS).shape == (0,)
+    expected = track_filter.predict(1)
+    assert expected is not None and len(expected) == 0
+    assert track_filter.update(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
 
 
 @pytest.mark.parametrize("order", range(3))
@@ -176,19 +178,18 @@ def test_two_who_meet_are_told_apart_by_their_heights(back: bool, heights: tuple
     assert ([set(chain) for chain in chains] == [{1}, {2}]) == (heights[0] != heights[1])
 
 
-def test_a_walker_may_turn() -> None:
+def test_who_turns_or_hides_is_the_same_and_far_away_is_new() -> None:
     turning: Way = lambda f: (f / RATE - 3.0, 0.0, 1.7) if f < 25 else (0.125, (f - 24) / RATE, 1.7)  # noqa: E731
     (chains,), _ = follow([turning], range(50))
     assert len(set(chains)) == 1
-
-
-def test_somebody_hidden_for_a_moment_is_the_same() -> None:
     for unseen in (range(10, 11), range(10, 14)):
         (chains,), _ = follow([except_for(walk(-1.5, 0, 1.2, 0), unseen)], range(24))
         assert set(chains) == {1}, unseen
+    (chains,), _ = follow([lambda f: (0.0, 0.0, 1.7) if f < 10 else (2.5, 0.0, 1.7)], range(20))
+    assert chains == [1] * 10 + [2] * 10
 
 
-def test_odds_fall_while_out_of_sight() -> None:
+def test_odds_fall_while_out_of_sight_until_patience_ends() -> None:
     _, track_filter = follow([except_for(walk(0, 0, 0.3, 0), range(10, 99))], range(14))
     odds, spread = [], []
     for frame in range(14, 18):
@@ -202,28 +203,12 @@ def test_odds_fall_while_out_of_sight() -> None:
     just_seen = follow([walk(0, 0, 0.3, 0)], range(10))[1].predict(10)
     assert just_seen is not None
     assert just_seen.existence[0] == 1.0  # at most: whoever is seen may leave all the same
-
-
-def test_patience_ends() -> None:
     patience = round(IDENTITY.patience * RATE)
     for gone, left in ((patience, 1), (patience + 1, 0)):
         _, track_filter = follow([except_for(walk(0, 0, 0, 0), range(10, 99))], range(10 + gone))
         assert len(track_filter.tracks) == left
     (chains,), _ = follow([except_for(walk(0, 0, 0, 0), range(10, 11 + patience))], range(40))
     assert chains == [1] * 10 + [2] * (len(chains) - 10)
-
-
-def test_far_away_is_somebody_new() -> None:
-    (chains,), _ = follow([lambda f: (0.0, 0.0, 1.7) if f < 10 else (2.5, 0.0, 1.7)], range(20))
-    assert chains == [1] * 10 + [2] * 10
-
-
-def test_predictions_before_the_first_and_after_an_empty_frame() -> None:
-    track_filter = TrackFilter(RATE, CONFIG)
-    assert track_filter.predict(0) is None and track_filter.update(0, GHOSTS, GHOSTS).shape == (0,)
-    expected = track_filter.predict(1)
-    assert expected is not None and len(expected) == 0
-    assert track_filter.update(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
 
 
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
@@ -294,8 +279,7 @@ def of_the_identity_search(measured: Floats, noise: Floats) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("squares", "noise"),
-    [(of_the_kalman_tracker, NOISE), (of_the_identity_search, ROUND * np.eye(2))],
+    ("squares", "noise"), [(of_the_kalman_tracker, NOISE), (of_the_identity_search, ROUND * np.eye(2))]
 )
 def test_innovations_are_as_large_as_claimed(squares: Callable[[Floats, Floats], list[float]], noise: Floats) -> None:
     """Innovations are independent, so their squares are: the mean of n has a standard deviation of 2 / sqrt(n)."""

@@ -85,9 +85,29 @@ def test_assignment_of_least_cost(rows: int, columns: int, seed: int) -> None:
     assert paid == pytest.approx(least[linear_sum_assignment(least)].sum())
 
 
-def test_distances() -> None:
+def test_distances_and_pieces_of_chains_where_they_were_seen() -> None:
     a, b = np.array([[0.0, 0.0], [3.0, 4.0]]), np.array([[3.0, 4.0], [0.0, 1.0], [3.0, 0.0]])
     np.testing.assert_allclose(distances(a, b), [[5, 1, 3], [0, np.hypot(3, 3), 4]])
+    paths = [walk((-3, -1), (0.4, 0), FRAMES), walk((0, 2), (0.3, -0.1), FRAMES)]
+    blobs, tracklets = tracklets_of(paths, FRAMES)
+    assert sorted(tracklet.filter_track for tracklet in tracklets) == [1, 2]
+    for tracklet in tracklets:
+        assert tracklet.frames == list(FRAMES)
+        for frame, blob, ground in zip(tracklet.frames, tracklet.blobs, tracklet.ground, strict=True):
+            assert np.hypot(*(ground - paths[tracklet.filter_track - 1][frame])) < 0.15
+            assert blobs[frame - FRAMES[0]].person[blob] >= 0
+    path = walk((-2, 0), (0.4, 0), FRAMES)
+    seen = {f: p for f, p in path.items() if 42 <= f < 50}
+    rest = {f: p for f, p in path.items() if f not in seen}
+    _, tracklets = tracklets_of([seen], FRAMES, unheld=[rest, dict.fromkeys(FRAMES, (2.0, -3.0))])
+    assert [tracklet.frames for tracklet in tracklets] == [list(range(42, 50))]
+    path = walk((-7, 0), (1.0, 0), FRAMES)
+    before = {f: p for f, p in path.items() if f < 45}
+    after = {f: p for f, p in path.items() if f >= 47}
+    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 3])
+    assert [(one.filter_track, one.frames) for one in tracklets] == [(3, [*range(40, 45), *range(47, 52)])]
+    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 4])  # two who are followed are two
+    assert [tracklet.filter_track for tracklet in tracklets] == [3, 4]
 
 
 def walk(start: Sequence[float], velocity: Sequence[float], frames: range) -> Path:
@@ -129,35 +149,6 @@ def tracklets_of(
 FRAMES = range(40, 52)
 
 
-def test_blobs_of_a_chain_are_a_piece() -> None:
-    paths = [walk((-3, -1), (0.4, 0), FRAMES), walk((0, 2), (0.3, -0.1), FRAMES)]
-    blobs, tracklets = tracklets_of(paths, FRAMES)
-    assert sorted(tracklet.filter_track for tracklet in tracklets) == [1, 2]
-    for tracklet in tracklets:
-        assert tracklet.frames == list(FRAMES)
-        for frame, blob, ground in zip(tracklet.frames, tracklet.blobs, tracklet.ground, strict=True):
-            assert np.hypot(*(ground - paths[tracklet.filter_track - 1][frame])) < 0.15
-            assert blobs[frame - FRAMES[0]].person[blob] >= 0
-
-
-def test_no_piece_has_frames_in_which_nobody_was_seen() -> None:
-    path = walk((-2, 0), (0.4, 0), FRAMES)
-    seen = {f: p for f, p in path.items() if 42 <= f < 50}
-    rest = {f: p for f, p in path.items() if f not in seen}
-    _, tracklets = tracklets_of([seen], FRAMES, unheld=[rest, dict.fromkeys(FRAMES, (2.0, -3.0))])
-    assert [tracklet.frames for tracklet in tracklets] == [list(range(42, 50))]
-
-
-def test_a_chain_is_one_piece_over_its_gap() -> None:
-    path = walk((-7, 0), (1.0, 0), FRAMES)
-    before = {f: p for f, p in path.items() if f < 45}
-    after = {f: p for f, p in path.items() if f >= 47}
-    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 3])
-    assert [(one.filter_track, one.frames) for one in tracklets] == [(3, [*range(40, 45), *range(47, 52)])]
-    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 4])  # two who are followed are two
-    assert [tracklet.filter_track for tracklet in tracklets] == [3, 4]
-
-
 HALF = 4
 """Frames that two windows of these tests share."""
 
@@ -195,11 +186,10 @@ def ids_of(names: dict[tuple[int, int], int], path: int) -> list[int]:
 
 
 def events_of(decisions: Sequence[WindowAssignment], kind: str) -> list[tuple[int, int, int]]:
-    """Frame, id and other id of the events of one kind."""
     return [(f, i, other) for d in decisions for f, k, i, other, _ in d.events if k == kind]
 
 
-def test_identities_last_over_windows() -> None:
+def test_identities_last_and_follow_the_cells_not_chains() -> None:
     frames = range(32)
     paths = [walk((-3, -1), (0.5, 0), frames), walk((3, 1), (-0.5, 0), frames)]
     windows_made, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 32)
@@ -208,12 +198,8 @@ def test_identities_last_over_windows() -> None:
     assert events_of(decisions, "birth") == [(0, 1, 0), (0, 2, 0)]
     assert all(kind == "birth" for d in decisions for _, kind, *_ in d.events)
     assert all(reason for d in decisions for *_, reason in d.events)
-
-
-def test_identities_follow_the_cells_whatever_the_chains_say() -> None:
-    """Chains that begin anew in each window: what two windows share tells."""
+    # Chains that begin anew in each window: what two windows share tells.
     frames = range(24)
-    paths = [walk((-3, -1), (0.5, 0), frames), walk((3, 1), (-0.5, 0), frames)]
     identities = TrackAssociation(RATE, CONFIG)
     found = []
     for index, start in enumerate(range(0, 20, 4)):
@@ -225,7 +211,7 @@ def test_identities_follow_the_cells_whatever_the_chains_say() -> None:
     assert all(pair == found[0] for pair in found) and sorted(found[0]) == [1, 2]
 
 
-def test_birth_and_death() -> None:
+def test_birth_death_and_who_is_found_again() -> None:
     stays = walk((-3, -1), (0.3, 0), range(40))
     leaves = walk((3, 1), (0.1, 0), range(11))
     comes = walk((0, 3), (0.2, 0), range(17, 40))
@@ -234,9 +220,6 @@ def test_birth_and_death() -> None:
     assert [len(i) for i in ids] == [1, 1, 1] and len({i[0] for i in ids}) == 3
     assert [(f, i) for f, i, _ in events_of(decisions, "birth")][2:] == [(17, ids[2][0])]
     assert events_of(decisions, "death") == [(10, ids[1][0], 0)]
-
-
-def test_somebody_unseen_for_a_moment_is_found_again() -> None:
     path = walk((-3, 0), (0.5, 0), range(40))
     seen = {f: p for f, p in path.items() if f not in range(13, 19)}
     _, decisions, names = decide(TrackAssociation(RATE, CONFIG), [seen], 40)
@@ -245,7 +228,7 @@ def test_somebody_unseen_for_a_moment_is_found_again() -> None:
     assert len(events_of(decisions, "birth")) == 1 and not events_of(decisions, "death")
 
 
-def test_merge_and_split() -> None:
+def test_merge_split_and_short_tracks_that_go() -> None:
     """Two people come within a step of each other and part."""
     frames = range(32)
     near = {f: 0.25 + 0.13 * abs(f - 16) for f in frames}
@@ -256,6 +239,14 @@ def test_merge_and_split() -> None:
     assert {(i, other) for _, i, other in [*merges, *splits]} == {(1, 2)}
     told = [f for (first, *_), (last, *_) in zip(merges, splits, strict=True) for f in range(first, last + 1)]
     assert told == [f for f in frames if len(blobs_in(paths, f).touches)]
+    least = round(CONFIG.minimum_duration * RATE)
+    rows = rows_of({1: walk((0, 0), (0, 0), range(5, 5 + least)), 2: walk((2, 0), (0, 0), range(7, 6 + least))})
+    kept, events = drop_short(rows, RATE, CONFIG)
+    assert np.unique(kept["id"]).tolist() == [1] and len(kept) == least
+    assert [(e["frame"], e["kind"], e["id"], e["other"]) for e in events] == [(7, b"dropped", 2, 0)]
+    assert events["reason"][0]
+    empty, none = drop_short(rows[:0], RATE, CONFIG)
+    assert len(empty) == len(none) == 0
 
 
 @drawn(24, st.integers(0, 999))
@@ -286,17 +277,6 @@ def rows_of(paths: dict[int, Path]) -> Rows:
     rows = trajectory_of(*sorted((f, i, *place) for i, path in paths.items() for f, place in path.items()))
     rows["raw_x"], rows["raw_y"], rows["xx"], rows["yy"] = rows["x"], rows["y"], 0.01, 0.01
     return rows
-
-
-def test_short_tracks_go_with_an_event() -> None:
-    least = round(CONFIG.minimum_duration * RATE)
-    rows = rows_of({1: walk((0, 0), (0, 0), range(5, 5 + least)), 2: walk((2, 0), (0, 0), range(7, 6 + least))})
-    kept, events = drop_short(rows, RATE, CONFIG)
-    assert np.unique(kept["id"]).tolist() == [1] and len(kept) == least
-    assert [(e["frame"], e["kind"], e["id"], e["other"]) for e in events] == [(7, b"dropped", 2, 0)]
-    assert events["reason"][0]
-    empty, none = drop_short(rows[:0], RATE, CONFIG)
-    assert len(empty) == len(none) == 0
 
 
 @drawn(100, st.sets(st.integers(0, 30), min_size=2), st.sets(st.integers(0, 30), min_size=1))

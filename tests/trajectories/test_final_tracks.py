@@ -36,27 +36,29 @@ def story(events: Rows) -> list[tuple[int, bytes, int, int]]:
     return [(int(e["frame"]), bytes(e["kind"]), int(e["id"]), int(e["other"])) for e in events]
 
 
-def test_who_is_found_again_was_neither_dead_nor_born() -> None:
+def test_births_and_deaths_are_at_end_rows_and_no_reunions() -> None:
     rows = committed(gone(2.0))
     found = whole(rows, lives(rows))
     assert story(found.events) == [(0, b"birth", 1, 0), (40, b"hand-over", 1, 0), (63, b"death", 1, 0)]
     assert found.events["reason"].tolist()[0] == b"so it was"
     assert found.events["reason"].tolist()[1].startswith(b"goes on as 2 of /committed: ")
     assert set(found.identity.tolist()) == {1}
-
-
-def test_births_and_deaths_beyond_the_border_are_at_end_rows() -> None:
     rows = committed(rows_of({1: (visit(-1), 1.7, range(3, 60))}, noise=0.0))
     beyond = events_of((0, "birth", 1, 0), (1, "birth", 2, 0), (2, "death", 2, 0), (62, "death", 1, 0))
     assert story(whole(rows, beyond).events) == [(3, b"birth", 1, 0), (59, b"death", 1, 0)]
 
 
-def test_a_gap_longer_than_the_bridge_stays() -> None:
+def test_long_gaps_and_raw_places_stay() -> None:
     long, short = (whole(committed(gone(seconds)), events_of()) for seconds in (2.0, 0.5))
     assert long.trajectory["frame"].tolist() == [*range(24), *range(40, 64)]
     assert short.trajectory["frame"].tolist() == list(range(52))
     filled = np.isin(short.trajectory["frame"], range(24, 28))
     assert (short.trajectory["extent"] > 0).tolist() == (~filled).tolist()
+    rows = committed(rows_of({3: (visit(1), 1.7, range(60))}, noise=0.1))
+    found = whole(rows, events_of()).trajectory
+    np.testing.assert_array_equal(found["raw_x"], rows["x"])
+    np.testing.assert_array_equal(found["raw_y"], rows["y"])
+    assert (found["x"] != rows["x"]).all() and (found["xx"] < rows["xx"]).all()
 
 
 def test_events_of_a_swap_are_under_the_names_that_are_right() -> None:
@@ -97,21 +99,6 @@ def next_row(rows: Rows, track: int, frame: int) -> int:
     return int(np.flatnonzero((rows["id"] == track) & (rows["frame"] == frame))[0])
 
 
-def test_rows_of_dropped_tracks_have_no_identity() -> None:
-    rows = committed(rows_of({5: (visit(1), 1.7, range(40)), 7: (straight(1.0, -2.0, 0, 0), 1.7, range(10, 13))}))
-    found = whole(rows, events_of())
-    assert found.identity.tolist() == np.where(rows["id"] == 5, 5, 0).tolist()
-    assert story(found.events) == [(10, b"dropped", 7, 0)] and set(found.trajectory["id"].tolist()) == {5}
-
-
-def test_raw_places_stay_beside_the_smoothed() -> None:
-    rows = committed(rows_of({3: (visit(1), 1.7, range(60))}, noise=0.1))
-    found = whole(rows, events_of()).trajectory
-    np.testing.assert_array_equal(found["raw_x"], rows["x"])
-    np.testing.assert_array_equal(found["raw_y"], rows["y"])
-    assert (found["x"] != rows["x"]).all() and (found["xx"] < rows["xx"]).all()
-
-
 @drawn(60, runs(5))
 def test_tracks_and_events_of_any_run_do_not_contradict(drawn: Rows) -> None:
     rows = committed(drawn)
@@ -129,10 +116,18 @@ def test_tracks_and_events_of_any_run_do_not_contradict(drawn: Rows) -> None:
     assert all(found.events["reason"].tolist())
 
 
-def test_nobody_at_all() -> None:
+def test_nobody_dropped_tracks_and_a_single_measurement() -> None:
     found = whole(np.zeros(0, TRAJECTORY), events_of())
     assert len(found.trajectory) == len(found.events) == len(found.identity) == 0
     assert len(smooth_places(np.zeros(0, TRAJECTORY), SMOOTHER_RATE, MOTION)) == 0
+    rows = committed(rows_of({5: (visit(1), 1.7, range(40)), 7: (straight(1.0, -2.0, 0, 0), 1.7, range(10, 13))}))
+    found = whole(rows, events_of())
+    assert found.identity.tolist() == np.where(rows["id"] == 5, 5, 0).tolist()
+    assert story(found.events) == [(10, b"dropped", 7, 0)] and set(found.trajectory["id"].tolist()) == {5}
+    ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
+    places, spread = smoothed_paths(np.array([3.0]), ground, noise, [np.arange(1)], MOTION)
+    np.testing.assert_array_equal(places, ground)
+    np.testing.assert_array_equal(spread, noise)
 
 
 SMOOTHER_RATE = 8.0
@@ -179,13 +174,6 @@ def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Float
     np.testing.assert_allclose(places, expected, atol=1e-9, rtol=0)
     np.testing.assert_allclose(spread, covariance, atol=1e-9, rtol=0)
     assert (np.linalg.eigvalsh(spread) > 0).all() and (np.linalg.eigvalsh(noise - spread) > -1e-9).all()
-
-
-def test_a_single_measurement_stays_what_it_is() -> None:
-    ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
-    places, spread = smoothed_paths(np.array([3.0]), ground, noise, [np.arange(1)], MOTION)
-    np.testing.assert_array_equal(places, ground)
-    np.testing.assert_array_equal(spread, noise)
 
 
 @pytest.mark.parametrize(("yy", "xy"), [(0.0, 0.0), (0.01, 0.01), (0.01, 0.0100001)])
