@@ -71,7 +71,7 @@ def test_lengths_are_kept_where_asked(room: Path, kind: Literal["rigid", "simila
     assert again.scale == pytest.approx(found.scale) and max(point.off for point in again.points) < 1e-6
 
 
-def test_wrong_points_are_named(room: Path) -> None:
+def test_wrong_points_and_signs_are_named(room: Path) -> None:
     placed = room.parent / "placed.toml"
     refused(CalibrationError, r"points.csv: y: found a mirrored ground", align_rig, room, points(room, (1, -1)), placed)
     refused(CalibrationError, r"line 2: found a pixel above", align_rig, room, points(room, ahead=False), placed)
@@ -80,9 +80,6 @@ def test_wrong_points_are_named(room: Path) -> None:
     refused(CalibrationError, r"1 points of one place", align_rig, room, one, placed)
     one.write_text("camera,u,v,x,y\nroof,1,2,3,4\n", encoding="utf-8")
     refused(CalibrationError, r"'roof', expected a camera of the rig: cam1", align_rig, room, one, placed)
-
-
-def test_a_ground_counted_downwards_is_named_with_its_sign(room: Path) -> None:
     rig = read_recording(room).rig
     downwards = np.array([camera.projection * [1, -1, 1, 1] for camera in rig.cameras])
     sizes = [camera.size for camera in rig.cameras]

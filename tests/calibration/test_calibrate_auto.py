@@ -73,13 +73,20 @@ def test_a_moved_camera_shows_the_moved_world_as_before(turn: float, scale: floa
     )
 
 
-def test_the_ground_and_heights_come_back_from_pixels() -> None:
+def test_ground_heights_and_lens_come_back_from_people() -> None:
     view = a_view()
     ground = np.array([[0.0, 0.0], [1.0, 0.5], [-1.5, 1.0]])
     low = pixels(view, np.column_stack([ground, np.zeros(3)]))
     np.testing.assert_allclose(on_plane(view, IMAGE, low, 0.0), ground, atol=1e-6)
     high = pixels(view, np.column_stack([ground, [1.5, 1.7, 1.9]]))
     np.testing.assert_allclose(height_of_head(view, IMAGE, high, ground), [1.5, 1.7, 1.9], atol=1e-6)
+    scene = walking(1, 3, 40.0, noise=0.0)
+    camera = scene.rig.cameras[0]
+    view, miss = view_of_upright(scene.views.endpoints[0], camera.size, 1.7)
+    assert camera.lens is not None
+    assert np.exp(view[0]) * camera.size[0] == pytest.approx(camera.lens.matrix[0, 0], rel=0.15)
+    assert view[10] == pytest.approx(camera.centre[2], rel=0.1)
+    assert miss < 0.05
 
 
 def painted(*bodies: tuple[float, float, float, float]) -> Singles:
@@ -90,10 +97,18 @@ def painted(*bodies: tuple[float, float, float, float]) -> Singles:
     return np.asarray(image, np.float32) / np.float32(255)
 
 
-def test_ends_of_one_who_stands_free() -> None:
+def test_ends_of_one_who_stands_free_and_of_meetings() -> None:
     ((foot, head),) = upright_endpoints(painted((100, 150, 110, 80)))
     np.testing.assert_allclose(foot, [99, 157.5], atol=2)
     np.testing.assert_allclose(head, [111, 72.5], atol=2)
+    frame = np.arange(12)
+    pixel = np.zeros((12, 2))
+    endpoints = [Endpoints(frame + late, pixel, pixel - [0, 50]) for late in (0, 3)]
+    ground = np.stack([0.2 * frame, np.zeros(12)], 1)
+    met = match_endpoints(endpoints, np.array([0, 3]), [ground, ground + 0.1], 0.4, 5.0)
+    assert len(met.frame) == 12 and len(met.view) == 24 and set(met.person) == {0}
+    np.testing.assert_allclose(met.velocity[1:-1], np.tile([1.0, 0.0], (10, 1)))
+    assert len(match_endpoints(endpoints, np.array([0, 3]), [ground, ground + 1.0], 0.4, 5.0).frame) == 0
 
 
 @pytest.mark.parametrize(
@@ -111,7 +126,6 @@ def test_who_is_not_whole_free_and_upright_has_no_ends(bodies: list[tuple[float,
 
 
 def true_walks(scene: Walking) -> list[ViewPlaces]:
-    """People on the ground that the true cameras have them on."""
     return [
         ViewPlaces(endpoints.frame, camera.back_project(endpoints.foot) @ np.array([1, 1j]))
         for camera, endpoints in zip(scene.rig.cameras, scene.views.endpoints, strict=True)
@@ -126,27 +140,6 @@ def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> N
     assert best.delay == delay and best.support > 0.9 * len(a.frame)
     assert abs(best.factor - np.exp(1j * turn)) < 0.02 and abs(best.shift - (2 - 1j)) < 0.05
     assert align(a, mirrored(b), 5.0, 10)[0].support < 0.6 * best.support
-
-
-def test_meetings_join_one_row_a_view_and_follow_people() -> None:
-    frame = np.arange(12)
-    pixel = np.zeros((12, 2))
-    endpoints = [Endpoints(frame + late, pixel, pixel - [0, 50]) for late in (0, 3)]
-    ground = np.stack([0.2 * frame, np.zeros(12)], 1)
-    met = match_endpoints(endpoints, np.array([0, 3]), [ground, ground + 0.1], 0.4, 5.0)
-    assert len(met.frame) == 12 and len(met.view) == 24 and set(met.person) == {0}
-    np.testing.assert_allclose(met.velocity[1:-1], np.tile([1.0, 0.0], (10, 1)))
-    assert len(match_endpoints(endpoints, np.array([0, 3]), [ground, ground + 1.0], 0.4, 5.0).frame) == 0
-
-
-def test_one_view_knows_its_lens_and_height_from_upright_people() -> None:
-    scene = walking(1, 3, 40.0, noise=0.0)
-    camera = scene.rig.cameras[0]
-    view, miss = view_of_upright(scene.views.endpoints[0], camera.size, 1.7)
-    assert camera.lens is not None
-    assert np.exp(view[0]) * camera.size[0] == pytest.approx(camera.lens.matrix[0, 0], rel=0.15)
-    assert view[10] == pytest.approx(camera.centre[2], rel=0.1)
-    assert miss < 0.05
 
 
 DELAYS = [0, 4, -3]
@@ -179,37 +172,38 @@ def ground_errors(scene: Walking, solution: SolvedViews) -> tuple[Floats, float]
     return np.abs(factor * (x - x.mean()) - (y - y.mean())), float(abs(factor))
 
 
-def test_the_whole_way_finds_cameras_clocks_and_scale(scene: Walking, solution: SolvedViews) -> None:
+def test_the_whole_way_is_as_near_as_it_says_without_floor(scene: Walking, solution: SolvedViews) -> None:
     assert (solution.delay - solution.delay[0]).tolist() == DELAYS
     assert offsets_of(solution).tolist() == [-3, -7, 0]
     error, scale = ground_errors(scene, solution)
     assert np.median(error) < 0.05 and np.percentile(error, 95) < 0.10
     assert scale == pytest.approx(1.0, abs=0.02)
-
-
-def test_focal_lengths_are_as_near_as_they_say(scene: Walking, solution: SolvedViews) -> None:
     for camera, report in zip(scene.rig.cameras, reports_of(solution, 0.0), strict=True):
         assert camera.lens is not None and abs(report.focal - camera.lens.matrix[0, 0]) < 4 * report.focal_spread + 1
         assert 0 < report.centre_spread < 0.5 and report.foot_pixels < 4 and report.observations > 100
-
-
-def test_the_grid_holds_those_who_walked(solution: SolvedViews) -> None:
-    grid, points = grid_of(solution, 0.1), solution.adjustment.parameters.points
-    for axis, (low, high) in enumerate((grid.x, grid.y)):
-        assert low < np.percentile(points[:, axis], 2) and np.percentile(points[:, axis], 98) < high
-
-
-def test_a_bare_floor_changes_nothing(scene: Walking, solution: SolvedViews) -> None:
     bare = [np.full((height, width, 3), 120, np.uint8) for width, height in scene.views.sizes]
     same, marks = auto.sharpen_by_floor(scene.views, solution, bare)
     assert marks == 0 and same is solution
 
 
-def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: SolvedViews) -> None:
+def test_known_distances_fix_scale_uncertainties_and_grid(solution: SolvedViews) -> None:
     turned = scaled(centred(solution), 1.3)
     for one in (solution, turned):
         missed = residuals(one.adjustment.parameters, one.problem)
         np.testing.assert_allclose(missed, solution.adjustment.residual, atol=2e-3)
+    pixel = np.array([[150.0, 250.0], [300.0, 260.0]])
+    known = [KnownDistance(1, pixel, 3.0)]
+    larger = adjusted_to(solution, known)
+    assert measured(larger, known) == pytest.approx(3.0)
+    assert scale_spread(larger, known) < 0.03 < scale_spread(solution, []) < 0.1
+    spread = [reports_of(one, 0.1)[0].centre_spread for one in (solution, scaled(solution, 2.0))]
+    away = np.linalg.norm(solution.adjustment.parameters.views[0, 8:11])
+    assert spread[0] > 0.1 * away and spread[1] == pytest.approx(2 * spread[0])
+    again = replace(solution, adjustment=adjust(solution.adjustment.parameters, solution.problem))
+    assert scale_spread(again, []) == pytest.approx(scale_spread(solution, []), rel=0.02), "the covariance turns, too"
+    grid, points = grid_of(solution, 0.1), solution.adjustment.parameters.points
+    for axis, (low, high) in enumerate((grid.x, grid.y)):
+        assert low < np.percentile(points[:, axis], 2) and np.percentile(points[:, axis], 98) < high
 
 
 @pytest.mark.slow
@@ -217,32 +211,6 @@ def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: Solve
     wrong = solution.delay + np.array([0, 0, 1])
     again = refine_cameras(scene.views, solution.adjustment.parameters.views.copy(), wrong, lambda: None)
     assert (again.delay - again.delay[0]).tolist() == DELAYS
-
-
-def test_a_known_distance_fixes_the_scale(solution: SolvedViews) -> None:
-    pixel = np.array([[150.0, 250.0], [300.0, 260.0]])
-    known = [KnownDistance(1, pixel, 3.0)]
-    larger = adjusted_to(solution, known)
-    assert measured(larger, known) == pytest.approx(3.0)
-    assert scale_spread(larger, known) < 0.03 < scale_spread(solution, []) < 0.1
-
-
-def test_uncertainties_of_lengths_contain_that_of_the_scale(solution: SolvedViews) -> None:
-    spread = [reports_of(one, 0.1)[0].centre_spread for one in (solution, scaled(solution, 2.0))]
-    away = np.linalg.norm(solution.adjustment.parameters.views[0, 8:11])
-    assert spread[0] > 0.1 * away and spread[1] == pytest.approx(2 * spread[0])
-    again = replace(solution, adjustment=adjust(solution.adjustment.parameters, solution.problem))
-    assert scale_spread(again, []) == pytest.approx(scale_spread(solution, []), rel=0.02), "the covariance turns, too"
-
-
-def test_silhouettes_that_reach_beyond_bodies_are_found(scene: Walking) -> None:
-    beyond, views = np.array([3.0, -3.0, 0.0]), []
-    for one, pixels in zip(scene.views.endpoints, beyond, strict=True):
-        way = pixels * (one.foot - one.head) / one.length[:, None]
-        views.append(replace(one, foot=one.foot + way, head=one.head - way))
-    found = auto.calibrate_from_people(NAMES, replace(scene.views, endpoints=tuple(views)), lambda: None)
-    ends = IMAGE[0] * found.adjustment.parameters.views[:, ENDS].T
-    np.testing.assert_allclose(ends - ends.mean(axis=1, keepdims=True), [beyond] * 2, atol=1.0)
 
 
 @pytest.mark.parametrize("count", [3, *in_ci(1)])
@@ -259,19 +227,23 @@ def judge(places: list[ViewPlaces]) -> None:
     auto.require_merged(NAMES, places, auto.merge_views(places, auto.align_all(places, 5.0, 10, lambda: None)), 5.0, 10)
 
 
-def test_another_time_and_a_mirrored_view_are_named(scene: Walking) -> None:
+def test_other_times_mirrors_few_and_wide_people_are_found(scene: Walking) -> None:
     a, b, c = true_walks(scene)
     judge([a, b, c])
     refused(SourceError, r"^c: .* at the same time", judge, [a, b, replace(c, frame=c.frame + 500)])
     refused(SourceError, r"^b: .* mirror", judge, [a, mirrored(b), c])
-
-
-def test_people_who_stay_and_people_who_are_few_are_named(scene: Walking) -> None:
     endpoints = scene.views.endpoints[0]
     still = Endpoints(endpoints.frame, 0 * endpoints.foot + [200, 300], 0 * endpoints.head + [200, 200])
     few = endpoints.of(np.arange(10))
     for wrong, message in ((still, r"^a: .* stay in one place"), (few, r"^a: found 10 isolated people")):
         refused(SourceError, message, auto.calibrate_from_people, NAMES, changed(scene, 0, wrong).views, lambda: None)
+    beyond, views = np.array([3.0, -3.0, 0.0]), []
+    for one, pixels in zip(scene.views.endpoints, beyond, strict=True):
+        way = pixels * (one.foot - one.head) / one.length[:, None]
+        views.append(replace(one, foot=one.foot + way, head=one.head - way))
+    found = auto.calibrate_from_people(NAMES, replace(scene.views, endpoints=tuple(views)), lambda: None)
+    ends = IMAGE[0] * found.adjustment.parameters.views[:, ENDS].T
+    np.testing.assert_allclose(ends - ends.mean(axis=1, keepdims=True), [beyond] * 2, atol=1.0)
 
 
 def film(path: Path, endpoints: Endpoints, frames: int) -> None:

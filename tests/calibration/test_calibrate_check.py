@@ -49,20 +49,18 @@ def judged(rig: Rig, boxes: dict[int, list[Floats]] | None = None) -> tuple[Chec
 
 
 class TestBoxes:
-    def test_blobs_are_boxed_and_noise_is_not(self) -> None:
+    def test_blobs_are_boxed_by_edges_and_noise_is_not(self) -> None:
         likelihood = np.full((480, 640), 0.02, np.float32)
         likelihood[100:300, 50:110] = 0.99
         likelihood[400:403, 600:603] = 0.99
         np.testing.assert_array_equal(isolated_boxes(likelihood, SIZE), [[49.5, 99.5, 109.5, 299.5]])
-
-    def test_boxes_are_edges(self) -> None:
         boxes = Boxes(np.array([[10.0, 20.0, 30.0, 90.0]]), np.ones(1))
         np.testing.assert_array_equal(isolated_boxes(boxes, SIZE), [[10, 20, 40, 110]])
         assert isolated_boxes(None, SIZE).shape == (0, 4)
 
 
 class TestPeople:
-    def test_people_are_found_where_they_walk(self) -> None:
+    def test_people_are_found_where_they_walk_and_else_nobody(self) -> None:
         tables = tables_of(RIG)
         people = match_frames(RIG, tables, SHOWN, range(0, 40, 4))
         assert 0.8 * 30 <= len(people) <= 33
@@ -71,35 +69,30 @@ class TestPeople:
         off = np.hypot(*np.moveaxis(true[..., :2] - placed.ground[:, None], -1, 0)).min(axis=1)
         assert np.median(off) < 0.03 and np.quantile(off, 0.9) < 0.1
         assert people.has_box.sum(axis=1).mean() > 3
-
-    def test_nobody_is_found_in_nothing(self) -> None:
         people = match_frames(RIG, tables_of(RIG), {0: [np.zeros((0, 4))] * 4}, [0])
         assert len(people) == 0 and people.box.shape == (0, 4, 4)
 
 
 class TestVerdict:
-    def test_a_sound_rig_is_called_sound(self) -> None:
+    def test_a_sound_rig_is_sound_and_others_off_by_how_much(self) -> None:
         check, (words,) = judged(RIG)
         assert check.sound
         assert words.startswith("the views agree: none is off by more than a cell (10 cm)")
+        check, (words, *_) = judged(moved(RIG, 2, "u", 30.0))
+        (view,) = check.verdict.named
+        assert view.view == 2 and not check.delays and not check.swapped
+        assert view.pixels == pytest.approx(30.0, rel=0.2)
+        assert view.right < -0.2, "the rig says further right, so people show to the left"
+        assert "to the left" in words and " px" in words
 
     @pytest.mark.parametrize(
-        ("view", "kind", "amount"),
-        [(1, "z", 0.25), *in_ci((0, "x", 0.4), (1, "y", -0.4), (0, "yaw", 14.0))],
+        ("view", "kind", "amount"), [(1, "z", 0.25), *in_ci((0, "x", 0.4), (1, "y", -0.4), (0, "yaw", 14.0))]
     )
     def test_the_camera_that_is_off_is_named(self, view: int, kind: str, amount: float) -> None:
         check, words = judged(moved(RIG, view, kind, amount))
         assert [one.view for one in check.verdict.named] == [view]
         assert words[0].startswith(f"cam{view + 1} is off: of ")
         assert not check.delays and not check.swapped
-
-    def test_by_how_much(self) -> None:
-        check, words = judged(moved(RIG, 2, "u", 30.0))
-        (view,) = check.verdict.named
-        assert view.view == 2 and not check.delays and not check.swapped
-        assert view.pixels == pytest.approx(30.0, rel=0.2)
-        assert view.right < -0.2, "the rig says further right, so people show to the left"
-        assert "to the left" in words[0] and " px" in words[0]
 
     @pytest.mark.slow
     def test_two_that_are_off_are_named(self) -> None:
@@ -108,29 +101,30 @@ class TestVerdict:
         check, _ = judged(moved(moved(rig, 1, "u", 35.0), 4, "z", 0.3), boxes)
         assert {one.view for one in check.verdict.named} == {1, 4}
 
-    def test_of_two_nobody_is_to_blame(self) -> None:
+    def test_of_two_or_of_few_people_nobody_is_to_blame(self) -> None:
         rig = replace(RIG, cameras=RIG.cameras[:2])
         boxes = {frame: views[:2] for frame, views in SHOWN.items()}
         assert judged(rig, boxes)[0].sound
         check, words = judged(moved(rig, 0, "z", 0.4), boxes)
         assert check.verdict.unresolved is not None and not check.verdict.named
         assert "two views alone do not tell" in words[0]
-
-    def test_too_few_people(self) -> None:
         _, words = judged(RIG, {frame: SHOWN[frame] for frame in range(4)})
         assert words == ["too few people stand alone before cam1, cam2, cam3, cam4 to judge (fewer than 20)"]
 
 
 class TestBlunders:
-    def test_swapped_streams_are_named(self) -> None:
+    def test_swapped_and_foreign_streams_are_named(self) -> None:
         check, words = judged(exchanged(RIG, 0, 1))
         assert check.swapped == ((0, 1),)
         assert words[0] == "cam1 and cam2 seem to be swapped: their frames fit far better the other way round"
-
-    def test_swaps_that_a_symmetric_ring_cannot_tell_apart(self) -> None:
         check, words = judged(exchanged(RIG, 1, 3))
         assert sorted(check.swapped) == [(0, 2), (1, 3)]
         assert "cam2 and cam4" in words[0] and "cam1 and cam3" in words[0] and ", or " in words[0]
+        elsewhere = shown(RIG, walkers(40, 3, seed=77))
+        boxes = {frame: [*views[:3], elsewhere[frame][3]] for frame, views in SHOWN.items()}
+        check, words = judged(RIG, boxes)
+        assert 3 in check.lost
+        assert any("cam4 shows only" in sentence for sentence in words)
 
     @pytest.mark.parametrize(("view", "frames"), [(2, -3), *in_ci((0, 2))])
     def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
@@ -143,24 +137,14 @@ class TestBlunders:
         side = "late" if frames > 0 else "early"
         assert words == [f"cam{view + 1} runs {abs(frames)} frames {side}: add {-frames} to its offset in the rig file"]
 
-    def test_a_stream_of_something_else_is_named(self) -> None:
-        elsewhere = shown(RIG, walkers(40, 3, seed=77))
-        boxes = {frame: [*views[:3], elsewhere[frame][3]] for frame, views in SHOWN.items()}
-        check, words = judged(RIG, boxes)
-        assert 3 in check.lost
-        assert any("cam4 shows only" in sentence for sentence in words)
 
-
-def test_coverage_counts_views() -> None:
+def test_coverage_counts_views_and_grids_lie_on_the_ground() -> None:
     has_box = Sampling.of(RIG, "point").views()
     assert has_box.shape == RIG.grid.shape and has_box.max() == 4
     camera = RIG.cameras[0]
     alone = Sampling.of(replace(RIG, cameras=(camera,)), "point").views()
     pixel, ahead = camera.project(RIG.grid.ground[10, 20], 0.0)
     assert alone[0, 10, 20] == int(ahead and camera.inside(pixel))
-
-
-def test_the_grid_is_drawn_where_the_ground_is() -> None:
     plain = grid_picture(RIG.cameras[0], replace(RIG.grid, x=(90.0, 95.0), y=(90.0, 95.0)), None, 0, 640)
     drawn = grid_picture(RIG.cameras[0], RIG.grid, None, 0, 640)
     changed = (plain != drawn).any(axis=-1)
@@ -182,7 +166,7 @@ class TestCommand:
         write_rig("room.toml", Recording(Path("room.toml"), moved(RIG, 2, "u", 30.0), tuple(sources)))
         return Path("room.toml")
 
-    def test_verdict_page_and_pictures(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_verdict_page_pictures_and_json(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run("check", str(rig_file), "-o=check.html", "--pictures=shots")
         printed = capsys.readouterr().out
         assert "cam3 is off: of " in printed and "it shows camera frames" in printed
@@ -192,6 +176,11 @@ class TestCommand:
         page = Path("check.html").read_text()
         assert "cam3 is off" in page and page.count("<img") == 5
         refused(OutputError, r"check.html: found a file that exists", run, "check", str(rig_file), "-o=check.html")
+        run("check", str(rig_file), "--json", "--frames=4:40")
+        found = json.loads(capsys.readouterr().out)
+        assert found["off"] == ["cam3"] and not found["sound"]
+        assert set(found["views"]) == {"cam1", "cam2", "cam3", "cam4"}
+        refused(ConfigError, r"--frames: found '9'", run, "check", str(rig_file), "--frames=9")
 
     def test_a_run_blames_the_exchange_for_what_its_views_look_like(self, rig_file: Path) -> None:
         recording, said = read_recording(rig_file), ["view cam2 denies most people"]
@@ -199,13 +188,6 @@ class TestCommand:
         assert explained_by_swap(recording, 0, said) == said and explained_by_swap(swapped, 0, []) == []
         (warning,) = explained_by_swap(swapped, 0, said)
         assert "cam2 and cam4" in warning and "seem to be swapped" in warning
-
-    def test_as_json_of_some_frames(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        run("check", str(rig_file), "--json", "--frames=4:40")
-        found = json.loads(capsys.readouterr().out)
-        assert found["off"] == ["cam3"] and not found["sound"]
-        assert set(found["views"]) == {"cam1", "cam2", "cam3", "cam4"}
-        refused(ConfigError, r"--frames: found '9'", run, "check", str(rig_file), "--frames=9")
 
 
 @pytest.mark.slow
@@ -291,7 +273,15 @@ def test_clicked_points_give_the_cameras(page: Page, tmp_path: Path) -> None:
 
 
 @needs_browser
-def test_undo_poles_keys_and_the_hint(page: Page) -> None:
+def test_everything_fits_one_screen_and_undo_keys_and_places(page: Page) -> None:
+    page.picture(1280, 720)
+    low = page.ask(
+        "Math.max(...[...document.querySelectorAll('figcaption')].map((f) => f.getBoundingClientRect().bottom))"
+    )
+    assert low < 720
+    page.ask("""(() => { const c = document.getElementById('view-cam1'), b = c.getBoundingClientRect();
+      c.dispatchEvent(new MouseEvent('mousemove', { clientX: b.left + 9, clientY: b.top + 9 })); return 0; })()""")
+    assert page.ask("document.getElementById('lens').getBoundingClientRect().width") == 160
     for ground in PLACES[:5]:
         press(page, "n")
         place(page, ground)
@@ -311,11 +301,6 @@ def test_undo_poles_keys_and_the_hint(page: Page) -> None:
       for (let k = 0; k < d.length; k += 4) n += d[k] > 220 && d[k + 1] > 140 && d[k + 1] < 190 && d[k + 2] < 40;
       return n; })()"""
     assert page.ask(yellow) > 30, "a ring where the next point helps most"
-
-
-@needs_browser
-def test_places_are_entered_snapped_and_dragged(page: Page) -> None:
-    table = "document.getElementById('csv').value"
     for ground in PLACES[:5]:
         press(page, "n")
         place(page, ground)
@@ -329,18 +314,6 @@ def test_places_are_entered_snapped_and_dragged(page: Page) -> None:
     press(page, "n")
     click(page, "plan", np.array([0.52, 0.26]))
     assert page.ask("[document.getElementById('x').value, document.getElementById('y').value]") == ["0", "1.5"]
-
-
-@needs_browser
-def test_everything_fits_one_screen(page: Page) -> None:
-    page.picture(1280, 720)
-    low = page.ask(
-        "Math.max(...[...document.querySelectorAll('figcaption')].map((f) => f.getBoundingClientRect().bottom))"
-    )
-    assert low < 720
-    page.ask("""(() => { const c = document.getElementById('view-cam1'), b = c.getBoundingClientRect();
-      c.dispatchEvent(new MouseEvent('mousemove', { clientX: b.left + 9, clientY: b.top + 9 })); return 0; })()""")
-    assert page.ask("document.getElementById('lens').getBoundingClientRect().width") == 160
 
 
 @needs_browser

@@ -73,12 +73,20 @@ class TestFit:
         assert found.off_pixel.max() < 1e-4 and found.off_ground.max() < 1e-6
         assert not found.out.any()
 
-    def test_points_above_the_ground_reveal_another_kind_of_camera(self) -> None:
+    def test_points_reveal_cameras_or_hide_lenses_by_their_number(self) -> None:
         square = camera()
         matrix = np.array([[1.0, 0.0, 90.0], [0.0, 1.3, -60.0], [0.0, 0.0, 1.0]])  # a crop, pixels that are not square
         true = Camera.from_projection("cam", SIZE, matrix @ square.projection)
         found = fit(points_of(true), true)
         assert found.vertical_from == "points" and off(found.camera, true) < 1e-3
+        points = points_of(camera(distortion=BARREL), 1.6 * SPREAD, None)
+        assert any("the lens bends" in word for word in fit_warnings(fit_points("cam", SIZE, points), GRID))
+        ground, view = np.random.default_rng(1).uniform(-2, 2, (20_000, 2)), camera()
+        pixel = view.project(ground, 0.0)[0]
+        require_plane("cam", ground, pixel)
+        np.testing.assert_allclose(
+            fit_homography(ground, pixel), view.ground / np.linalg.norm(view.ground[2]), atol=1e-6
+        )
 
     @pytest.mark.parametrize("askew", [0.0, 2.0])
     def test_a_wall_stands_for_the_ground(self, askew: float) -> None:
@@ -96,18 +104,6 @@ class TestFit:
         found = fit_points("cam", SIZE, Points(pixel, points.ground, points.height))
         assert found.vertical_from == "radial lens" and np.flatnonzero(found.out).tolist() == [2] * wrong
         assert off(found.camera, true) < 8 and found.off_ground[~found.inner.low].max() < 0.1, "as long as the error"
-
-    def test_a_lens_is_named_where_few_points_hide_it(self) -> None:
-        points = points_of(camera(distortion=BARREL), 1.6 * SPREAD, None)
-        assert any("the lens bends" in word for word in fit_warnings(fit_points("cam", SIZE, points), GRID))
-
-    def test_memory_goes_with_the_number_of_points(self) -> None:
-        ground, view = np.random.default_rng(1).uniform(-2, 2, (20_000, 2)), camera()
-        pixel = view.project(ground, 0.0)[0]
-        require_plane("cam", ground, pixel)
-        np.testing.assert_allclose(
-            fit_homography(ground, pixel), view.ground / np.linalg.norm(view.ground[2]), atol=1e-6
-        )
 
     @pytest.mark.parametrize("seed", range(6))
     def test_errors_of_clicks_stay_what_they_are(self, seed: int) -> None:
@@ -246,6 +242,10 @@ class TestCommand:
         assert "off px" in printed and "off cm" in printed
         assert "square pixels" in printed
 
+    def test_a_lens_for_each_camera(self) -> None:
+        table(Path("p.csv"))
+        refused(ConfigError, r"--lens: found 'lens.xml', expected a path with", run, "p.csv", "--lens=lens.xml")
+
     def test_millimetres_are_named_and_taken(self) -> None:
         table(Path("p.csv"), lambda _, row: [*row[:2], *(1000 * cell for cell in row[2:])])
         refused(CalibrationError, r"a, lines 2 to 11, --unit m: found a camera 2600 m .*\(--unit mm\)", run, "p.csv")
@@ -287,10 +287,6 @@ class TestCommand:
         Path("p.csv").write_text(text)
         refused(getattr(errors, kind), complaint, run, "p.csv")
         assert not Path("room.toml").exists()
-
-    def test_a_lens_for_each_camera(self) -> None:
-        table(Path("p.csv"))
-        refused(ConfigError, r"--lens: found 'lens.xml', expected a path with", run, "p.csv", "--lens=lens.xml")
 
 
 def test_points_are_read_as_they_stand(tmp_path: Path) -> None:

@@ -47,7 +47,6 @@ def with_person(image: Bytes, colour: tuple[float, float, float] = SHIRT) -> Byt
 
 
 def taught(kind: type[Background], **constants: float) -> Background:
-    """A model that has seen twenty frames of the empty room."""
     model = new(kind, **constants)
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -64,32 +63,50 @@ def in_shadow(share: float) -> tuple[float, float, float]:
 
 
 @every_model
-def test_the_likelihood_is_a_posterior_with_the_given_prior(kind: type[Background]) -> None:
+def test_likelihoods_are_posteriors_of_what_a_model_can_take(kind: type[Background]) -> None:
     model: Background = taught(kind, foreground_prior=0.2)
     assert model.prior == 0.2
     likelihood = model.likelihood(with_person(room()))
     assert likelihood.dtype == np.float32 and likelihood[0, 0] < 0.01
     assert likelihood[MIDDLE] > 0.98 and ((likelihood > 0) & (likelihood < 1)).all()
+    refused(SourceError, "learned nothing", new(kind).likelihood, room())
+    refused(SourceError, "no frames", new(kind).learn_from, [])
+    for image in (room()[1:], room()[:, :, 0], room().astype(np.float32)):
+        refused(SourceError, "image", taught(kind).likelihood, image)  # type: ignore[arg-type]
+    refused(ConfigError, "frame_rate", kind, SIZE, 0.0)
 
 
 @compiled_only
 @every_model
-def test_a_person_who_stands_for_a_minute_does_not_fade(kind: type[Background]) -> None:
+def test_people_do_not_fade_and_light_that_changes_is_nobody(kind: type[Background]) -> None:
     model, rng = taught(kind), np.random.default_rng(4)
     for _ in range(int(60 * RATE)):
         likelihood = model.likelihood(noisy(with_person(room()), rng))
     assert likelihood[MIDDLE] > 0.98
     assert model.likelihood(room())[MIDDLE] < 0.02  # and leaves no hole behind
+    scene = np.random.default_rng(5).integers(40, 160, (24, 24, 3)).astype(np.uint8)
+    model = kind((24, 24), RATE)  # type: ignore[call-arg]  # as models have it
+    for _ in range(5):
+        model.learn(scene)
+    for gain in (1.0, 0.6, 1.5, *np.linspace(1.5, 0.7, 20)):
+        empty = np.clip(np.round(scene * gain * np.array([1.0, 0.95, 1.05])), 0, 255).astype(np.uint8)
+        assert model.likelihood(empty).max() < 0.05
+        assert model.likelihood(with_person(empty, (5, 5, 5)))[MIDDLE] > 0.95
 
 
 @every_model
-def test_a_shadow_stays_background_softly_and_teaches_nothing(kind: type[Background]) -> None:
+def test_shadows_and_people_teach_nothing(kind: type[Background]) -> None:
     model = taught(kind)
     for _ in range(60):
         likelihood = model.likelihood(with_person(room(), in_shadow(0.7)))
     assert 0.02 < likelihood[MIDDLE] < 0.2
     assert model.likelihood(with_person(room(), in_shadow(0.3)))[MIDDLE] > 0.95  # deeper than any shadow
     assert model.likelihood(room())[MIDDLE] < 0.02
+    model, rng = taught(kind), np.random.default_rng(8)
+    for _ in range(40):
+        b, g, r = rng.integers(0, 256, 3)
+        model.likelihood(with_person(room(), (b, g, r)))
+    assert model.likelihood(room()).max() < 0.02
 
 
 @compiled_only
@@ -106,33 +123,16 @@ def test_a_part_of_the_scene_may_change_slowly(kind: type[Background]) -> None:
 
 
 @every_model
-def test_a_chair_becomes_background_after_the_absorption(kind: type[Background]) -> None:
+def test_flicker_is_background_and_a_chair_becomes_it(kind: type[Background]) -> None:
+    model = new(kind)
+    for k in range(20):
+        model.learn(room() if k % 2 else room((200, 200, 200)))
+    assert model.likelihood(room()).max() < 0.05 and model.likelihood(room((200, 200, 200))).max() < 0.05
     model, rng = taught(kind, absorption_time=20.0, smoothing_radius=0), np.random.default_rng(6)
     chair = with_person(room())
     answers = [float(model.likelihood(noisy(chair, rng))[MIDDLE]) for _ in range(int(24 * RATE))]
     assert min(answers[: int(19 * RATE)]) > 0.9 and max(answers[int(22 * RATE) :]) < 0.1
     assert model.likelihood(room())[MIDDLE] < 0.1  # its leaving is no ghost
-
-
-@compiled_only
-@every_model
-def test_light_that_changes_at_once_or_slowly_is_no_person(kind: type[Background]) -> None:
-    scene = np.random.default_rng(5).integers(40, 160, (24, 24, 3)).astype(np.uint8)
-    model = kind((24, 24), RATE)  # type: ignore[call-arg]  # as models have it
-    for _ in range(5):
-        model.learn(scene)
-    for gain in (1.0, 0.6, 1.5, *np.linspace(1.5, 0.7, 20)):
-        empty = np.clip(np.round(scene * gain * np.array([1.0, 0.95, 1.05])), 0, 255).astype(np.uint8)
-        assert model.likelihood(empty).max() < 0.05
-        assert model.likelihood(with_person(empty, (5, 5, 5)))[MIDDLE] > 0.95
-
-
-@every_model
-def test_flicker_shown_while_learning_is_background(kind: type[Background]) -> None:
-    model = new(kind)
-    for k in range(20):
-        model.learn(room() if k % 2 else room((200, 200, 200)))
-    assert model.likelihood(room()).max() < 0.05 and model.likelihood(room((200, 200, 200))).max() < 0.05
 
 
 @every_model
@@ -145,15 +145,6 @@ def test_the_start_among_people_finds_what_is_behind_them(kind: type[Background]
     model.learn_from(frames)
     likelihood = model.likelihood(with_person(room()))
     assert likelihood[0, 0] < 0.05 and likelihood[MIDDLE] > 0.95
-
-
-@every_model
-def test_people_take_no_place_from_the_background(kind: type[Background]) -> None:
-    model, rng = taught(kind), np.random.default_rng(8)
-    for _ in range(40):
-        b, g, r = rng.integers(0, 256, 3)
-        model.likelihood(with_person(room(), (b, g, r)))
-    assert model.likelihood(room()).max() < 0.02
 
 
 @every_model
@@ -185,15 +176,6 @@ def test_a_copy_goes_on_bit_for_bit_and_by_itself(kind: type[Background]) -> Non
         np.testing.assert_array_equal(second.likelihood(frame), one)
 
 
-@every_model
-def test_what_a_model_cannot_take_is_refused(kind: type[Background]) -> None:
-    refused(SourceError, "learned nothing", new(kind).likelihood, room())
-    refused(SourceError, "no frames", new(kind).learn_from, [])
-    for image in (room()[1:], room()[:, :, 0], room().astype(np.float32)):
-        refused(SourceError, "image", taught(kind).likelihood, image)  # type: ignore[arg-type]
-    refused(ConfigError, "frame_rate", kind, SIZE, 0.0)
-
-
 def test_the_configuration_names_the_model() -> None:
     named = get_args(get_type_hints(ForegroundConfig)["model"])
     assert set(named) == {*MODELS_BY_NAME}
@@ -215,7 +197,7 @@ def test_the_chromatic_distance_is_mahalanobis(seed: int) -> None:
     assert np.sqrt(squared) == pytest.approx(reference.polar(x, mu)[1] / sigma, rel=1e-5, abs=1e-6)
 
 
-def test_in_flickering_light_people_are_found_by_colour() -> None:
+def test_people_are_found_by_colour_but_dark_or_in_highlights() -> None:
     rng = np.random.default_rng(9)
     models = [new(Mixture, smoothing_radius=0), new(Chromatic, smoothing_radius=0)]
     for _ in range(40):
@@ -226,21 +208,15 @@ def test_in_flickering_light_people_are_found_by_colour() -> None:
     alike = (FLOOR[0] - 18, FLOOR[1], FLOOR[2] + 18)
     mixture, chromatic = (float(model.likelihood(with_person(room(), alike))[3, 2]) for model in models)
     assert chromatic > 0.9 > 0.5 > mixture
-
-
-def test_a_dark_pixel_has_no_chromaticity_to_speak_of() -> None:
     dark = new(Chromatic)
     for _ in range(20):
         dark.learn(room((7, 9, 4)))
     assert dark.likelihood(with_person(room((7, 9, 4)), (5, 6, 7)))[MIDDLE] < 0.1
-
-
-def test_a_slight_highlight_is_softer_than_a_person() -> None:
     answers = [float(taught(Codebook).likelihood(with_person(room(), in_shadow(r)))[MIDDLE]) for r in (1.15, 1.5)]
     assert answers[0] < 0.7 and answers[1] > 0.95
 
 
-def test_brightness_between_the_bounds_is_background() -> None:
+def test_brightness_in_bounds_and_second_colours_stay() -> None:
     model = new(Codebook)
     for k in range(20):
         model.learn(room(in_shadow(0.9 + 0.01 * k)))
@@ -248,18 +224,21 @@ def test_brightness_between_the_bounds_is_background() -> None:
         image = with_person(room(), in_shadow(share))
         image[0] = SHIRT  # an edge that keeps the view from having one gain
         assert model.likelihood(image)[MIDDLE] < 0.02
+    lamp = (90, 200, 240)
+    for colours, likely in (([0, 1] * 10, False), ([1, 1, 1, 0, 0, 0, 0, 0, 0, 0] * 2, True)):
+        model = new(Codebook)
+        model.learn_from([room(lamp) if lit else room() for lit in colours])
+        assert model.likelihood(room()).max() < 0.05
+        assert (model.likelihood(with_person(room(), lamp))[MIDDLE] > 0.9) == likely
 
 
-def test_somebody_who_comes_and_goes_is_never_absorbed() -> None:
+def test_nobody_is_absorbed_and_the_first_is_never_forgotten() -> None:
     model, rng = taught(Codebook, absorption_time=20.0, absence=3.0), np.random.default_rng(10)
     for second in range(80):  # there for ten seconds, away for five
         seen = with_person(room()) if second % 15 < 10 else room()
         for _ in range(int(RATE)):
             likelihood = model.likelihood(noisy(seen, rng))
             assert (likelihood[MIDDLE] > 0.9) == (second % 15 < 10)
-
-
-def test_what_was_learned_first_is_never_forgotten() -> None:
     model = taught(Codebook, absorption_time=5.0, memory=5.0, smoothing_radius=0)
     for _ in range(int(60 * RATE)):
         model.likelihood(with_person(room()))
@@ -268,15 +247,6 @@ def test_what_was_learned_first_is_never_forgotten() -> None:
     for _ in range(int(10 * RATE)):
         model.likelihood(room())
     assert model.likelihood(with_person(room()))[MIDDLE] > 0.9  # somebody like the chair, after it is gone
-
-
-def test_a_recurring_second_colour_is_background() -> None:
-    lamp = (90, 200, 240)
-    for colours, likely in (([0, 1] * 10, False), ([1, 1, 1, 0, 0, 0, 0, 0, 0, 0] * 2, True)):
-        model = new(Codebook)
-        model.learn_from([room(lamp) if lit else room() for lit in colours])
-        assert model.likelihood(room()).max() < 0.05
-        assert (model.likelihood(with_person(room(), lamp))[MIDDLE] > 0.9) == likely
 
 
 NOW = 50

@@ -44,7 +44,6 @@ def with_person(image: Bytes, colour: tuple[float, float, float] = SHIRT) -> Byt
 
 
 def taught(config: MixtureConfig | None = None, frame_rate: float = 10.0) -> Mixture:
-    """A model that has seen twenty frames of the empty room."""
     model = Mixture(SIZE, frame_rate, config)
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -57,15 +56,11 @@ def answer(model: Mixture, colour: tuple[float, float, float]) -> float:
     return float(deepcopy(model).likelihood(with_person(room(), colour))[6, 6])
 
 
-def test_likelihood_rises_with_the_distance_from_the_background() -> None:
+def test_likelihood_rises_with_distance_but_not_in_shadows() -> None:
     model = taught()
     answers = [answer(model, (110 + d, 140, 60)) for d in range(0, 100, 4)]
     assert (np.diff(answers) >= 0).all()
     assert any(0.1 < a < 0.9 for a in answers)  # soft, not a mask
-
-
-def test_shadows_are_far_less_likely_than_people() -> None:
-    model = taught()
     shadows = [answer(model, (110 * r, 140 * r, 60 * r)) for r in np.arange(1.0, 0.2, -0.05)]
     assert 0.02 < shadows[6] < 0.2
     assert answer(model, (110 + 33, 140 + 42, 60 - 18)) > 0.95  # as far from the background, but lit
@@ -82,11 +77,17 @@ def test_the_shadows_density_integrates_to_one() -> None:
     assert total * 4.0**3 == pytest.approx(1, abs=0.01)
 
 
-def test_single_noisy_pixels_are_outvoted_by_their_neighbours() -> None:
+def test_noisy_pixels_are_outvoted_and_gains_hold_in_crowds() -> None:
     image = room()
     image[6, 6] = SHIRT
     assert taught().likelihood(image)[6, 6] < 0.1
     assert taught(MixtureConfig(smoothing_radius=0)).likelihood(image)[6, 6] > 0.9
+    rng = np.random.default_rng(6)
+    background = rng.integers(50, 150, (40, 40, 3)).astype(np.float32)
+    image = np.round(background * 1.3).astype(np.uint8)
+    image[:24] = rng.integers(0, 256, (24, 40, 3))
+    np.testing.assert_allclose(channel_gains(image, background), 1.3, rtol=0.01)
+    np.testing.assert_array_equal(channel_gains(np.zeros_like(image), background), 1)
 
 
 def test_learning_gives_every_empty_frame_the_same_weight() -> None:
@@ -101,28 +102,16 @@ def test_learning_gives_every_empty_frame_the_same_weight() -> None:
     assert (variance[:, :, 0] >= MixtureConfig().minimum_sd ** 2).all()
 
 
-def test_a_shadow_changes_no_mode() -> None:
+def test_shadows_and_people_take_no_mode() -> None:
     model = taught()
     before = model.modes.copy()
     for _ in range(20):
         model.likelihood(with_person(room(), (77, 98, 42)))
     np.testing.assert_array_equal(model.modes[..., 6, 6], before[..., 6, 6])
-
-
-def test_people_take_no_mode_from_the_background() -> None:
     model = taught(MixtureConfig(modes=1))
     for _ in range(30):
         model.likelihood(with_person(room()))
     assert model.likelihood(room()).max() < 0.02
-
-
-def test_the_gain_holds_where_people_cover_more_than_half() -> None:
-    rng = np.random.default_rng(6)
-    background = rng.integers(50, 150, (40, 40, 3)).astype(np.float32)
-    image = np.round(background * 1.3).astype(np.uint8)
-    image[:24] = rng.integers(0, 256, (24, 40, 3))
-    np.testing.assert_allclose(channel_gains(image, background), 1.3, rtol=0.01)
-    np.testing.assert_array_equal(channel_gains(np.zeros_like(image), background), 1)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -171,16 +160,13 @@ def test_modes_learn_by_their_rules(seed: int, modes: int, config: reference.Gau
         np.testing.assert_allclose(one, other, rtol=tolerance, atol=tolerance)
 
 
-def test_rows_between_the_turns_stay_as_they_are() -> None:
+def test_rows_between_turns_stay_and_strong_modes_come_first() -> None:
     rng = np.random.default_rng(4)
     state = reference.planes_of(*random_modes(rng, 2, MixtureConfig()))
     found, adaptation = state.copy(), Adaptation(*(np.float32(number) for number in (0.05, 0.001, 0.1, 5, 12, 4, 4)))
     image, likelihood = rng.integers(0, 256, (3, 4, 3)).astype(np.uint8), np.zeros((3, 4), np.float32)
     adapt_mixture(image, np.ones(3, np.float32), likelihood, adaptation, 1, 4, found)
     np.testing.assert_array_equal(found[:, :, [0, 2]], state[:, :, [0, 2]])
-
-
-def test_the_strongest_mode_comes_first() -> None:
     state = reference.planes_of(*random_modes(np.random.default_rng(3), 4, MixtureConfig()))
     found = state.copy()
     put_strongest_first(0, 1, found)
@@ -205,18 +191,14 @@ def test_the_commonest_colour_is_the_one_with_most_companions(seed: int, count: 
     np.testing.assert_allclose(variance, expected_variance, atol=1e-3)
 
 
-def test_a_mask_is_read_as_likelihood() -> None:
+def test_masks_are_likelihoods_and_boxes_hold_soft_bodies() -> None:
     likelihood = mask_likelihood(np.array([[0, 51, 255]], np.uint8))
     assert likelihood.dtype == np.float32
     np.testing.assert_allclose(likelihood, [[0, 0.2, 1]])
     refused(SourceError, "expected", mask_likelihood, np.zeros((2, 2, 3), np.uint8))
-
-
-def boxes_of(*rows: tuple[float, float, float, float], score: list[float] | None = None) -> Boxes:
-    return Boxes(np.array(rows, float).reshape(-1, 4), np.array([1.0] * len(rows) if score is None else score))
-
-
-def test_a_box_holds_a_soft_body_of_its_score() -> None:
+    refused(InputError, "score", box_likelihood, boxes_of((0, 0, 1, 1), score=[1.5]), (4, 4))
+    refused(InputError, "finite", box_likelihood, boxes_of((0, float("nan"), 1, 1)), (4, 4))
+    refused(InputError, "step", box_likelihood, boxes_of((0, 0, 1, 1)), (4, 4), step=0)
     likelihood = box_likelihood(boxes_of((9.5, 4.5, 21, 51), score=[0.8]), (40, 60))
     assert likelihood.dtype == np.float32 and likelihood.max() == pytest.approx(0.8)
     assert likelihood[35, 20] == pytest.approx(0.8)  # the trunk
@@ -228,6 +210,10 @@ def test_a_box_holds_a_soft_body_of_its_score() -> None:
     assert not likelihood[~inside].any()
 
 
+def boxes_of(*rows: tuple[float, float, float, float], score: list[float] | None = None) -> Boxes:
+    return Boxes(np.array(rows, float).reshape(-1, 4), np.array([1.0] * len(rows) if score is None else score))
+
+
 @drawn(30, seed=st.integers(0, 10**6), count=st.integers(0, 3), step=st.integers(1, 4))
 def test_the_box_map_is_its_definition(seed: int, count: int, step: int) -> None:
     rng = np.random.default_rng(seed)
@@ -235,12 +221,6 @@ def test_the_box_map_is_its_definition(seed: int, count: int, step: int) -> None
     boxes = Boxes(pixel, rng.uniform(0, 1, count))
     found = box_likelihood(boxes, (17, 19), step)
     np.testing.assert_allclose(found, reference.body_map(boxes, (17, 19), step), atol=1e-5)
-
-
-def test_boxes_that_are_no_boxes_are_refused() -> None:
-    refused(InputError, "score", box_likelihood, boxes_of((0, 0, 1, 1), score=[1.5]), (4, 4))
-    refused(InputError, "finite", box_likelihood, boxes_of((0, float("nan"), 1, 1)), (4, 4))
-    refused(InputError, "step", box_likelihood, boxes_of((0, 0, 1, 1)), (4, 4), step=0)
 
 
 @drawn(30, arrays(np.uint16, (6, 5), elements=st.sampled_from((0, 0, 0, 3, 7, 65535))))

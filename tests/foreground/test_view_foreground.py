@@ -24,7 +24,7 @@ def test_without_prior_keeps_the_likelihood_ratio(ratio_share: float, prior: flo
     assert alone == pytest.approx(ratio_share, rel=2e-2, abs=1e-4)
 
 
-def test_each_kind_of_observation_has_its_evidence_and_pixels() -> None:
+def test_each_kind_of_observation_has_evidence_or_is_refused() -> None:
     foreground = ViewForeground()
     boxes = Boxes(np.array([[1.0, 2.0, 3.0, 4.0]]), np.ones(1))
     assert foreground.evidence(None) is foreground.pixels(None) is foreground.pixels(boxes) is None
@@ -35,6 +35,7 @@ def test_each_kind_of_observation_has_its_evidence_and_pixels() -> None:
     found = foreground.evidence(instances)
     assert isinstance(found, Boxes) and len(found) == 2
     np.testing.assert_array_equal(foreground.pixels(instances), np.array([[0, 1], [1, 0]], np.float32))
+    refused(ValueError, "background", ViewForeground().evidence, np.zeros((4, 4, 3), np.uint8))
 
 
 @pytest.mark.parametrize("model", ["mixture", "chromatic", "codebook"])
@@ -50,10 +51,6 @@ def test_the_prior_is_taken_out_of_colour_likelihoods(model: Any) -> None:
     found = np.asarray(ViewForeground(IlluminationMonitor(models[1], 10.0)).evidence(frame))
     np.testing.assert_array_equal(found, without_prior(posterior, models[1].prior))
     assert (found >= posterior).all() and found[6, 7] > posterior[6, 7]
-
-
-def test_a_colour_frame_without_a_background_is_refused() -> None:
-    refused(ValueError, "background", ViewForeground().evidence, np.zeros((4, 4, 3), np.uint8))
 
 
 SIZE = (64, 48)
@@ -86,7 +83,6 @@ def shot(light: Floats | float, people: Flags, rng: np.random.Generator) -> Byte
 
 
 def watched(model: Callable[..., Background]) -> IlluminationMonitor:
-    """A model that has seen the empty room."""
     rng = np.random.default_rng(1)
     learned = model(SIZE, RATE)
     for _ in range(15):
@@ -139,7 +135,7 @@ def test_what_changes_all_of_a_view_alike_is_no_event(model: Callable[..., Backg
         assert (found[~body(frame)] > 0.5).mean() < 0.03
 
 
-def test_somebody_before_the_lens_is_no_light() -> None:
+def test_somebody_before_the_lens_and_nothing_are_no_light() -> None:
     watch = watched(Mixture)
     rng = np.random.default_rng(4)
     near = np.asarray((U > 20) & (U < 44) & (V > 4))
@@ -147,6 +143,9 @@ def test_somebody_before_the_lens_is_no_light() -> None:
     assert sum(found is None for found in maps) < RATE and (np.asarray(maps[-1])[near] > 0.5).mean() > 0.95
     again = np.asarray(watch.likelihood(shot(1.0, near & False, rng)), float)
     assert (again > 0.5).mean() < 0.03 and np.isfinite(again).all()  # and leaves no ghost
+    dark = np.zeros((48, 64, 3), np.uint8)
+    field = gain_field(dark, scene().astype(np.float32), np.ones(SIZE[::-1], np.float32))
+    np.testing.assert_allclose(field, 1)
 
 
 def test_a_blind_view_has_no_evidence_and_says_when() -> None:
@@ -172,12 +171,6 @@ def test_the_field_is_the_light_where_people_cover_a_part(seed: int, tilt: float
     assert field.dtype == np.float32
     off = np.abs(np.log(field / light[..., None]))
     assert np.median(off) < 0.03 and off[~people].mean() < 0.06
-
-
-def test_nothing_to_ask_is_no_light() -> None:
-    dark = np.zeros((48, 64, 3), np.uint8)
-    field = gain_field(dark, scene().astype(np.float32), np.ones(SIZE[::-1], np.float32))
-    np.testing.assert_allclose(field, 1)
 
 
 def test_only_still_colours_are_learned_in_a_new_light() -> None:

@@ -113,17 +113,13 @@ class TestCamera:
             assert not seen
             assert not camera.inside(pixel)
 
-    def test_pixels_above_the_horizon_show_no_ground(self) -> None:
+    def test_the_horizon_heights_and_edges_of_the_image(self) -> None:
         camera = Camera.from_projection("cam", (640, 480), LEVEL)
         ground = camera.back_project(np.array([[320.0, 300.0], [320.0, 200.0]]))
         assert np.isfinite(ground[0]).all() and np.isnan(ground[1]).all()
-
-    def test_heights_broadcast_with_points(self) -> None:
         pixel, seen = straight_down().project(np.zeros((4, 1, 2)), np.array([0.0, 1.0]))
         assert pixel.shape == (4, 2, 2)
         assert seen.shape == (4, 2)
-
-    def test_image_spans_half_a_pixel_around_the_outermost_centres(self) -> None:
         camera = straight_down()
         corners = np.array([[-0.5, -0.5], [643.4, 485.4], [643.5, 0.0], [0.0, 485.5], [-0.6, 0.0]])
         assert camera.inside(corners).tolist() == [True, True, False, False, False]
@@ -184,15 +180,13 @@ class TestLens:
         assert Lens(MATRIX, np.array([-1 / 3]), "fisheye").fold == pytest.approx(np.tan(1.0))
         assert Lens(MATRIX, np.zeros(0)).fold == np.inf
 
-    def test_far_point_that_folds_back_into_the_image_is_unseen(self) -> None:
+    def test_points_that_fold_back_and_unreached_corners(self) -> None:
         camera = straight_down(lens=LENS)
         far = np.array([4.8, 0.0])
         pixel, seen = camera.project(far, 0.0)
         assert camera.inside(pixel), "the polynomial brings it back"
         assert not seen
         assert camera.project(np.array([1.0, 0.0]), 0.0)[1]
-
-    def test_corner_that_no_ray_reaches_shows_nothing(self) -> None:
         corner, middle = LENS.undistort(np.array([[0.0, 0.0], [300.0, 200.0]]))
         assert np.isnan(corner).all()
         assert np.isfinite(middle).all()
@@ -231,12 +225,10 @@ class TestRig:
     def test_that_watches_its_area(self, rig: Rig) -> None:
         rig.require_coverage()
 
-    def test_camera_that_looks_away_is_named(self) -> None:
+    def test_cameras_that_look_away_are_named_but_at_upper_planes(self) -> None:
         away = Grid((50.0, 51.0), (0.0, 1.0), cell=0.5)
         with pytest.raises(CalibrationError, match=r"camera down: ground: found a view that sees nothing"):
             Rig("hall", 5.0, away, (straight_down(),)).require_coverage()
-
-    def test_sight_of_an_upper_plane_is_enough(self) -> None:
         camera = Camera.from_projection("cam", (640, 480), LEVEL)
         near = Grid((-0.5, 0.5), (1.0, 2.0), cell=0.5, top=1.8, planes=4)
         pixel, seen = camera.project(near.ground, 0.0)

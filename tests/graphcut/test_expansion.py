@@ -54,11 +54,28 @@ def test_energy_by_definition(seed: int, shape: tuple[int, ...]) -> None:
     assert energy.of(np.zeros(energy.cells, np.int64)) == 0
 
 
-def test_an_inadmissible_label_is_refused() -> None:
+def test_no_label_one_label_and_cells_outside_the_cut() -> None:
     energy = LabelEnergy(*(np.array(a) for a in ([0, 1, 1], [2], [-5], [0], [1], [1])))
     assert energy.of(np.array([2, 0])) == -4
     for labels in ([1, 0], [2, 2]):
         refused(ValueError, "inadmissible", expand, energy, np.array(labels))
+    empty = np.zeros(0, np.int64)
+    assert len(expand(LabelEnergy(np.zeros(1, np.int64), empty, empty, empty, empty, empty), empty)) == 0
+    alone = LabelEnergy(np.zeros(4, np.int64), empty, empty, empty, empty, empty)
+    assert expand(alone, np.zeros(3, np.int64)).tolist() == [0, 0, 0]
+    assert len(minimise(QuadraticEnergy(empty, empty, empty, empty)).labels) == 0
+    for seed in range(10):
+        energy = random_energy(seed, (4, 6), 1, 3, admissible=1.0)
+        cut = sparse_cut(-energy.cost, energy.start, energy.end, energy.weight, energy.weight)
+        np.testing.assert_array_equal(expand(energy, np.zeros(energy.cells, np.int64)), cut)
+    # Cells with label 0 in the binary cut of the best costs stay background.
+    for seed in range(10):
+        energy = random_energy(seed, (5, 7), 3, 3, admissible=0.8)
+        best = np.array([max(0, *(-cost for cost in costs.values())) for costs in reference.costs(energy)])
+        only = np.array([min([costs[k] for k in costs if k] or [9]) for costs in reference.costs(energy)])
+        unary = np.where(best > 0, best, -only)
+        inside = sparse_cut(unary, energy.start, energy.end, energy.weight, energy.weight)
+        assert not expand(energy, np.where(inside, energy.cheapest_labels(), 0))[~inside].any()
 
 
 @drawn(40, st.integers(0, 999), st.sampled_from(TINY), st.integers(0, 6))
@@ -118,32 +135,6 @@ def test_with_one_weight_the_result_is_that_of_aexpansion_grid(admissible: float
         ours = expand(energy, start)
         assert energy.of(ours) == energy.of(theirs)
         np.testing.assert_array_equal(ours, theirs)
-
-
-def test_with_one_label_it_is_the_two_label_cut() -> None:
-    for seed in range(10):
-        energy = random_energy(seed, (4, 6), 1, 3, admissible=1.0)
-        cut = sparse_cut(-energy.cost, energy.start, energy.end, energy.weight, energy.weight)
-        np.testing.assert_array_equal(expand(energy, np.zeros(energy.cells, np.int64)), cut)
-
-
-def test_cells_outside_the_binary_cut_never_change() -> None:
-    """Cells with label 0 in the binary cut of the best costs stay background."""
-    for seed in range(10):
-        energy = random_energy(seed, (5, 7), 3, 3, admissible=0.8)
-        best = np.array([max(0, *(-cost for cost in costs.values())) for costs in reference.costs(energy)])
-        only = np.array([min([costs[k] for k in costs if k] or [9]) for costs in reference.costs(energy)])
-        unary = np.where(best > 0, best, -only)
-        inside = sparse_cut(unary, energy.start, energy.end, energy.weight, energy.weight)
-        assert not expand(energy, np.where(inside, energy.cheapest_labels(), 0))[~inside].any()
-
-
-def test_nothing_to_label() -> None:
-    empty = np.zeros(0, np.int64)
-    assert len(expand(LabelEnergy(np.zeros(1, np.int64), empty, empty, empty, empty, empty), empty)) == 0
-    alone = LabelEnergy(np.zeros(4, np.int64), empty, empty, empty, empty, empty)
-    assert expand(alone, np.zeros(3, np.int64)).tolist() == [0, 0, 0]
-    assert len(minimise(QuadraticEnergy(empty, empty, empty, empty)).labels) == 0
 
 
 def quadratic_energy(seed: int, nodes: int, edges: int, low: int, high: int) -> QuadraticEnergy:

@@ -67,7 +67,7 @@ def test_energy_by_definition(seed: int, shape: tuple[int, ...], neighbours: int
     assert sorted(zip(*(part.tolist() for part in energy.edges()), strict=True)) == sorted(reference.neighbours(energy))
 
 
-def test_energy_of_log_odds() -> None:
+def test_energy_of_log_odds_and_neighbourhoods() -> None:
     """Capacities by the formula, in quanta; unseen cells have unary term 0."""
     log_odds = np.array([1.5, np.nan, -1e9, 1e9], np.float32).reshape(1, 1, 1, 4)
     config = SegmentationConfig(smoothness=0.5, distance_scale=0.2, time_distance=0.3)
@@ -78,9 +78,6 @@ def test_energy_of_log_odds() -> None:
     distance = [{(0, 0, 0, 1): 0.1, (0, 0, 1, 0): 0.1}.get(tuple(o), 0.3) for o in energy.offsets.tolist()]
     expected = [0.5 * np.exp(-0.5 * (d / 0.2) ** 2) / QUANTUM for d in distance]
     np.testing.assert_allclose(energy.capacity, expected, atol=0.5)
-
-
-def test_neighbourhoods_are_half_of_all_neighbours() -> None:
     for neighbours in (8, 80):
         offsets = [tuple(offset) for offset in neighbourhood(neighbours).tolist()]
         assert len({*offsets, *(tuple(-step for step in offset) for offset in offsets)}) == neighbours
@@ -150,15 +147,12 @@ def test_the_reduction_is_exact(seed: int, strength: int, neighbours: int) -> No
     np.testing.assert_array_equal(state[state != UNDECIDED] == LABEL_ONE, expected[state != UNDECIDED])
 
 
-def test_strong_evidence_is_decided_by_the_reduction() -> None:
+def test_strong_evidence_is_reduced_and_misfits_are_refused() -> None:
     energy = window(1, (3, 2, 5, 6), unary=1, capacity=1)
     strong = replace(energy, unary=np.where(energy.unary > 0, 100, -100).astype(np.int32))
     cut = minimum_cut(strong)
     assert cut.nodes == 0
     np.testing.assert_array_equal(cut.occupied, strong.unary > 0)
-
-
-def test_capacities_that_do_not_fit_are_refused() -> None:
     energy = window(1, (1, 1, 2, 2), unary=1, capacity=1)
     refused(OverflowError, "16384", minimum_cut, replace(energy, capacity=np.full(4, 16384, np.int32)))
 

@@ -55,12 +55,20 @@ def test_the_priors_variance_can_be_taken_out_again(values: tuple[float, float, 
     np.testing.assert_allclose(again.width_variance, measured.width_variance, rtol=1e-4)
 
 
-def test_what_says_nothing_leaves_the_prior() -> None:
+def test_what_says_nothing_and_who_is_hidden_keep_the_prior() -> None:
     prior = sizes_of(1.8, 0.1)
     other = sizes_of(1.6, 0.05)
     after = prior.as_measurements(prior).with_prior(other)
     np.testing.assert_allclose([after.height, after.width], [other.height, other.width], atol=1e-5)
     np.testing.assert_allclose(after.height_variance, other.height_variance, rtol=1e-4)
+    view = pixel_view()
+    sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
+    nobodys = open_to_one(np.zeros(view.shape, bool))
+    place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_population(1, BODY)
+    found = body_sizes(place, width, [view], [sight], nobodys, BODY)
+    np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
+    blind = body_sizes(place, width, [view], [None], nobodys, BODY)
+    np.testing.assert_allclose(blind.height_variance, anybody.height_variance, rtol=0.03)  # of the lattice, cut off
 
 
 def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Candidates) -> Floats:
@@ -101,18 +109,7 @@ def test_the_e_step_by_definition(hidden: float) -> None:
         assert variance[0] == pytest.approx(weight @ (lattice - weight @ lattice) ** 2, abs=1e-6)
 
 
-def test_who_is_hidden_is_like_anybody() -> None:
-    view = pixel_view()
-    sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
-    nobodys = open_to_one(np.zeros(view.shape, bool))
-    place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_population(1, BODY)
-    found = body_sizes(place, width, [view], [sight], nobodys, BODY)
-    np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
-    blind = body_sizes(place, width, [view], [None], nobodys, BODY)
-    np.testing.assert_allclose(blind.height_variance, anybody.height_variance, rtol=0.03)  # of the lattice, cut off
-
-
-def test_wider_people_are_found_wider() -> None:
+def test_wider_people_are_found_wider_up_to_the_head() -> None:
     """Silhouettes of a body of the profile's width, and of one a fifth slimmer."""
     views, found, place = [pixel_view(k) for k in range(4)], [], np.zeros((1, 2))
     own = open_to_one(*(np.ones(view.shape, bool) for view in views))
@@ -126,10 +123,7 @@ def test_wider_people_are_found_wider() -> None:
             observations.append(view.observe(image))
         found.append(float(body_sizes(at(place), np.array([0.42]), views, observations, own, BODY).width[0]))
     assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04 and found[1] == pytest.approx(WIDTH, abs=0.04)
-
-
-def test_the_head_closes() -> None:
-    """The highest pixel of a silhouette is that of the crown, also where the camera looks down."""
+    # The highest pixel of a silhouette is that of the crown, also where the camera looks down.
     camera = corner_cameras()[0]
     shown = likelihoods([camera], people((0.0, 0.0, 1.8)))[0]
     crown, _ = camera.project(np.zeros((1, 2)), np.array([1.8]))
@@ -222,31 +216,22 @@ def test_differences_of_halves_are_as_large_as_claimed(white: float, lasting: fl
     assert (of_two**2).mean() / claimed > 3
 
 
-def test_rows_of_a_long_time_count_as_their_mean_errs() -> None:
-    errors = LastingError(np.array([0.02**2]), np.array([0.05**2]), np.array([1.5]))
-    frames = np.arange(4000)
-    np.testing.assert_allclose(errors.row_variance(RATE) / len(frames), mean_variance(errors, frames), rtol=0.02)
-    assert errors.row_variance(RATE)[0] > 10 * errors.variance[0]
-
-
-def test_a_short_recording_keeps_the_prior() -> None:
+def test_short_recordings_sitters_and_long_tracklets_say_little() -> None:
     values, frame = recording(0.02, 0.0, 1.0, people=1, frames=5)
     errors = found(values, frame)
     assert errors.variance[0] > 0.1 * PRIOR.variance[0] and np.isfinite(errors.row_variance(RATE)).all()
-
-
-def test_people_who_sit_down_are_no_errors() -> None:
     values, frame = recording(0.02, 0.04, 1.0, people=60)
     before = found(values, frame)
     values[:2, 80:] -= 0.4
     assert found(values, frame).row_variance(RATE)[0] < 1.5 * before.row_variance(RATE)[0]
-
-
-def test_one_long_tracklet_says_little_of_far_lags() -> None:
-    """Most tracklets are short; in the only long one somebody rises from a chair."""
+    # Most tracklets are short; in the only long one somebody rises from a chair.
     values, frame = recording(0.02, 0.03, 0.6, people=151)
     values[0, 80:] += 0.5
     short = np.split(np.arange(160, values.size), 150)
     tracklets = [np.arange(160), *(rows[:16] for rows in short)]
     errors = constant_errors(values.reshape(1, -1), frame, tracklets, PRIOR, RATE)
     assert errors.variance[0] < 2 * (0.02**2 + 0.03**2)
+    errors = LastingError(np.array([0.02**2]), np.array([0.05**2]), np.array([1.5]))
+    frames = np.arange(4000)
+    np.testing.assert_allclose(errors.row_variance(RATE) / len(frames), mean_variance(errors, frames), rtol=0.02)
+    assert errors.row_variance(RATE)[0] > 10 * errors.variance[0]

@@ -34,12 +34,6 @@ RATE = 5.0
 CONFIG = ErrorRateConfig(memory=1e6, prior_weight=2.0)
 
 
-def test_tolerance_of_boxes_follows_their_score() -> None:
-    tolerance, belief = PRIOR_NOISE.of(np.array([1.0, 0.6, 0.2]))
-    np.testing.assert_allclose(tolerance[0], TOLERANCE)
-    np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
-
-
 @drawn(100, st.lists(st.floats(0, 1), max_size=5))
 def test_what_is_sharper_says_more(scores: list[float]) -> None:
     score = np.array(scores)
@@ -49,16 +43,7 @@ def test_what_is_sharper_says_more(scores: list[float]) -> None:
     np.testing.assert_allclose(more - belief, 4 * box_fit.EFFECTIVE_OBSERVATIONS * np.log(2))
 
 
-def test_stout_bodies_have_wide_tolerances_and_the_same_belief() -> None:
-    score = np.array([0.3, 0.9])
-    stout = BoxNoiseEstimate(RATE, CONFIG, BodyConfig(height_mean=0.6, width_mean=0.42).stoutness).noise.of(score)
-    slim = BoxNoiseEstimate(RATE, CONFIG).noise.of(score)
-    for of_stout, person, ratio in zip(stout, slim, (1.7 / 0.6, 1), strict=True):
-        np.testing.assert_allclose(of_stout, ratio * person)
-    assert BodyConfig().stoutness == BodyConfig().breadth == BodyConfig(width_mean=0.3).stoutness == 1.0
-
-
-def test_noise_begins_at_the_prior_and_forgets() -> None:
+def test_noise_begins_at_the_prior_by_score_and_forgets() -> None:
     sharpening = BoxNoiseEstimate(RATE, replace(CONFIG, memory=1.0))
     np.testing.assert_allclose(sharpening.noise.spread, PRIOR_NOISE.spread)
     taught(sharpening, 0.01, 1.0, 20)
@@ -67,6 +52,9 @@ def test_noise_begins_at_the_prior_and_forgets() -> None:
     for _ in range(50):
         sharpening.offsets.forget()
     np.testing.assert_allclose(sharpening.noise.spread[-1], PRIOR_NOISE.spread[-1], rtol=1e-3)
+    tolerance, belief = PRIOR_NOISE.of(np.array([1.0, 0.6, 0.2]))
+    np.testing.assert_allclose(tolerance[0], TOLERANCE)
+    np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
 
 
 def taught(sharpening: BoxNoiseEstimate, spread: float, score: float, frames: int) -> None:
@@ -127,27 +115,21 @@ def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
     assert max(np.abs(foot - body[:, 3]).max() for foot, body in zip(feet, bodies, strict=True)) < 2.0
 
 
-def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
+def test_knots_alone_learn_anew_in_each_session_not_the_width() -> None:
     sharpening = BoxNoiseEstimate(RATE, CONFIG)
     taught(sharpening, 0.1, 1.0, 30)
     learned = sharpening.noise.spread
     assert (learned <= PRIOR_NOISE.spread).all()
     np.testing.assert_array_equal(learned[:, WIDTH_OFFSET], PRIOR_NOISE.spread[:, WIDTH_OFFSET])
-
-
-def test_only_knots_beside_a_score_learn_of_it() -> None:
     sharpening = BoxNoiseEstimate(RATE, CONFIG)
     taught(sharpening, 0.02, 0.7, 10)
     changed = ~np.isclose(sharpening.noise.spread, PRIOR_NOISE.spread).all(1)
     np.testing.assert_array_equal(changed, np.isin(box_fit.SCORE_KNOTS, (0.6, 0.8)))
-
-
-def test_each_session_begins_with_the_first_guess() -> None:
     frame_pass = detector_of(room(), "boxes")
     seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6)), 0.02, 1.0, np.random.default_rng(0))
-    learned = frame_pass.new_estimates()
-    frame_pass.explain_next(learned, 0, seen, None)
-    assert (learned.box_noise.offsets.sums[:, 0] > 0).any()
+    estimates = frame_pass.new_estimates()
+    frame_pass.explain_next(estimates, 0, seen, None)
+    assert (estimates.box_noise.offsets.sums[:, 0] > 0).any()
     np.testing.assert_allclose(frame_pass.new_estimates().box_noise.noise.spread, PRIOR_NOISE.spread)
 
 
@@ -184,19 +166,13 @@ def test_means_and_spreads_by_the_formulas() -> None:
     assert after.width_mean == pytest.approx(relative * mean) and after.width_spread >= body.width_spread
 
 
-def test_the_spread_of_a_population_has_a_bound() -> None:
+def test_a_spread_has_bounds_and_nothing_teaches_nothing() -> None:
     after = learned_body([sized([0.6, 0.6], [0.1, 1.2])] * 400)
     assert after.width_spread == pytest.approx(0.45 * after.width_mean)
-
-
-def test_nothing_seen_teaches_nothing() -> None:
     for frame in (sized([], []), sized([1.0], [0.2], unresolved=1.0), sized([1.0], [0.2], evidence=1.0)):
         after = learned_body([frame] * 20)
         found = [after.height_mean, after.height_spread, after.width_mean, after.width_spread]
         np.testing.assert_allclose(found, [1.7, 0.12, 0.42, 0.04])
-
-
-def test_people_alike_leave_the_least_spread_and_are_forgotten() -> None:
     alike = sized([1.7, 1.7], [0.42, 0.42])
     assert learned_body([alike] * 500).height_spread == BodyConfig().height_spread
     small = [sized([1.0], [0.25])] * 200
@@ -226,10 +202,16 @@ def recording(body: BodyPrior) -> Recording:
     return Recording(Path("rig.toml"), rig_of(cameras), sources, body)
 
 
-def test_the_rigs_bodies_are_kept_in_its_file() -> None:
+def test_stout_bodies_are_tolerated_and_kept_in_the_rig() -> None:
     for body in (BodyPrior(), BodyPrior(height_mean=0.6), BodyPrior(0.6, 0.05, 0.5, 0.1)):
         text = format_rig(recording(body), Path("rig.toml"))
         assert ("[body]" in text) == (body != BodyPrior()) and parse_rig(text, Path("rig.toml")).body == body
+    score = np.array([0.3, 0.9])
+    stout = BoxNoiseEstimate(RATE, CONFIG, BodyConfig(height_mean=0.6, width_mean=0.42).stoutness).noise.of(score)
+    slim = BoxNoiseEstimate(RATE, CONFIG).noise.of(score)
+    for of_stout, person, ratio in zip(stout, slim, (1.7 / 0.6, 1), strict=True):
+        np.testing.assert_allclose(of_stout, ratio * person)
+    assert BodyConfig().stoutness == BodyConfig().breadth == BodyConfig(width_mean=0.3).stoutness == 1.0
 
 
 @pytest.mark.parametrize("line", ["height_mean = -1", "heights = 1", "width_mean = 0.3\nwidth_spread = 0.2"])
@@ -279,7 +261,13 @@ def learned_rims(
     return rims
 
 
-def test_background_beside_foreground_says_less() -> None:
+def test_eaten_silhouettes_lose_their_rim_and_whole_ones_none() -> None:
+    rims, whole = learned_rims(APART, seen(APART, 0)), shown(np.full((3, 3), -1.0, np.float32))
+    assert rims.shares.sums[:, 0].min() > 1.0
+    np.testing.assert_array_equal(rims.withdrawn, 0.0)
+    assert without_rim(whole, 0.0) is whole
+    weak, strong = (learned_rims(APART, seen(APART, eaten)).withdrawn for eaten in (1, 3))
+    assert (strong > 0.8).all() and (weak < strong).all()
     raster = np.random.default_rng(5).normal(-1.0, 1.0, (17, 23)).astype(np.float32)
     beside = (maximum_filter(raster, 3) > 0) & (raster < 0)
     assert 20 < beside.sum() < (raster < 0).sum()
@@ -287,27 +275,12 @@ def test_background_beside_foreground_says_less() -> None:
     np.testing.assert_array_equal(without_rim(shown(raster), 0.75).raster, expected)
 
 
-def test_nothing_is_withdrawn_from_whole_silhouettes() -> None:
-    rims, whole = learned_rims(APART, seen(APART, 0)), shown(np.full((3, 3), -1.0, np.float32))
-    assert rims.shares.sums[:, 0].min() > 1.0
-    np.testing.assert_array_equal(rims.withdrawn, 0.0)
-    assert without_rim(whole, 0.0) is whole
-
-
-def test_eaten_silhouettes_lose_their_rim() -> None:
-    weak, strong = (learned_rims(APART, seen(APART, eaten)).withdrawn for eaten in (1, 3))
-    assert (strong > 0.8).all() and (weak < strong).all()
-
-
-def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
+def test_shares_leave_usual_misses_and_torn_masks_own_rates() -> None:
     rims = learned_rims(APART, seen(APART, 2), frames=200)
     weight, missing, rim = rims.shares.sums.T
     left = (missing - rims.withdrawn * rim) / weight
     np.testing.assert_allclose(left[rims.withdrawn < 1], FEW_HEIGHTS.pixel_miss_rate, atol=0.01)
     assert (rims.withdrawn > 0).any()
-
-
-def test_torn_masks_are_read_by_their_own_rates() -> None:
     whole = seen(APART, 0)
     bands = np.arange(room().cameras[0].size[1])[:, None] // 10 % 2
     torn = [np.asarray(np.where(bands, 0, view), np.float32) for view in map(np.asarray, whole)]
@@ -346,16 +319,13 @@ def test_masks_are_most_likely_by_the_people_in_them() -> None:
     assert is_unexplained(shares[: len(views)], views) and not is_unexplained(shares[len(views) :], views)
 
 
-def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
+def test_limbs_make_up_and_empty_views_take_the_mean() -> None:
     alone = people((0.0, 0.0, 1.7))
     views = likelihoods(room().cameras, alone)
     shifted = [np.roll(view, 2, axis=1) for view in views]
     eaten = [np.minimum(view, beside) for view, beside in zip(views, shifted, strict=True)]
     lost, beside = (learned_rims(alone, evidence).shares.sums[:, 1] for evidence in (eaten, shifted))
     assert (lost > 1.5 * beside).all()
-
-
-def test_a_view_without_people_takes_the_mean_of_the_others() -> None:
     rims = learned_rims(APART, seen(APART, 3))
     every = rims.withdrawn
     rims.shares.sums[2] = 0.0

@@ -111,7 +111,7 @@ def test_rates_are_found() -> None:
     assert abs(level.filled_share - 0.25) < 0.03
 
 
-def test_soft_likelihoods_sharpen_the_rates() -> None:
+def test_soft_likelihoods_sharpen_rates_of_pillars() -> None:
     """A map that only ever says 0.8 of bodies misses none of them: the rate falls frame by frame, not to 0.2."""
     level, shape = one_level(), (1, 1, 1)
     shown = reference.Shown((np.full(shape, round(0.8 * TOP_LEVEL), np.int16),), (np.ones(shape, np.float32),))
@@ -121,9 +121,18 @@ def test_soft_likelihoods_sharpen_the_rates() -> None:
         level.learn(np.stack([seen, errors])[:, None], np.zeros(2))
         rates.append(level.rates[0].miss)
     assert (np.diff(rates) < 0).all() and rates[-1] < 0.1
+    grid = Grid((-1.0, 1.0), (-1.0, 1.0), 0.05, 1.8, 10)
+    ground, height = np.array([[0.2, 0.1]]), np.array([1.7])
+    inside = inside_bodies(grid, nearest_person(grid.ground, ground, 0.5), ground, height)
+    body, reached = cells_per_person(grid, 1.7, 0.4)
+    assert inside.sum() == pytest.approx(body, rel=0.1)
+    assert reached == pytest.approx(10 * np.pi * 0.4**2 / 0.05**2)
+    assert not inside[-1].any()  # the uppermost plane is above the head
+    widest = inside[grid.heights.searchsorted(0.8 * 1.7) - 1].sum()
+    assert widest == inside.sum((1, 2)).max()
 
 
-def test_the_first_guess_holds_at_first_and_comes_back() -> None:
+def test_the_first_guess_comes_back_in_seconds() -> None:
     level = one_level(2)
     assert level.rates == [FIRST, FIRST] and level.filled_share == 0.5
     trials = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
@@ -138,27 +147,12 @@ def test_the_first_guess_holds_at_first_and_comes_back() -> None:
         level.learn(np.zeros((2, 2, 3)), np.zeros(2))
     assert learned > 0.4
     assert level.rates[0].miss == pytest.approx(0.2, abs=1e-3)
-
-
-def test_memory_is_in_seconds() -> None:
     slow, fast = ErrorRateEstimate([FIRST], 5.0, CONFIG), ErrorRateEstimate([FIRST], 20.0, CONFIG)
     once = np.ones((1, 3))
     for level, frames in ((slow, 100), (fast, 400)):
         for _ in range(frames):
             level.learn(np.stack([once, 0.3 * once]), np.zeros(2))
     np.testing.assert_allclose(slow.rates, fast.rates, atol=2e-3)
-
-
-def test_pillars_on_the_grid() -> None:
-    grid = Grid((-1.0, 1.0), (-1.0, 1.0), 0.05, 1.8, 10)
-    ground, height = np.array([[0.2, 0.1]]), np.array([1.7])
-    inside = inside_bodies(grid, nearest_person(grid.ground, ground, 0.5), ground, height)
-    body, reached = cells_per_person(grid, 1.7, 0.4)
-    assert inside.sum() == pytest.approx(body, rel=0.1)
-    assert reached == pytest.approx(10 * np.pi * 0.4**2 / 0.05**2)
-    assert not inside[-1].any()  # the uppermost plane is above the head
-    widest = inside[grid.heights.searchsorted(0.8 * 1.7) - 1].sum()
-    assert widest == inside.sum((1, 2)).max()
 
 
 @cache
@@ -205,7 +199,7 @@ def test_going_on_from_a_state_is_going_on() -> None:
             np.testing.assert_array_equal(fusion.fuse_and_learn(rest, *one).dense(), volume)
 
 
-def test_a_blind_view_learns_nothing() -> None:
+def test_blind_single_and_hiding_views_learn_nothing() -> None:
     fusion = occupancy("pixels")
     running = fusion.new_error_rates()
     seen, explanation = frame("pixels", 0)
@@ -213,22 +207,15 @@ def test_a_blind_view_learns_nothing() -> None:
     assert not running.counts.sums[0][0].any() and running.counts.sums[0][1:].all()
     fusion.fuse_and_learn(running, [None] * 4, explanation)
     assert running.rates[0] == ErrorRates(*running.first[0])
-
-
-def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
     fusion, (seen, explanation) = occupancy("pixels"), frame("pixels", 0)
-    running = fusion.new_error_rates()
     everybody = explanation.people
     parts = np.zeros_like(everybody.view_evidence)
     parts[0] = everybody.evidence
+    running = fusion.new_error_rates()
     fusion.fuse_and_learn(running, seen, replace(explanation, people=replace(everybody, view_evidence=parts)))
     assert not running.counts.sums[0][0, [MISS, NEAR_CLUTTER]].any()
     assert running.counts.sums[0][1:, [MISS, NEAR_CLUTTER]].all()
-
-
-def test_a_detector_is_not_blamed_for_the_hidden() -> None:
     fusion = occupancy("boxes")
-    running = fusion.new_error_rates()
     seen, explanation = frame("boxes", 0)
     hidden = np.array([[0.5] * len(explanation.people), *np.ones((3, len(explanation.people)))])
     unseen = replace(
@@ -236,5 +223,6 @@ def test_a_detector_is_not_blamed_for_the_hidden() -> None:
         people=replace(explanation.people, visibility=hidden),
         box_assignment=(np.zeros(0, np.int64), *explanation.box_assignment[1:]),
     )
+    running = fusion.new_error_rates()
     fusion.fuse_and_learn(running, [no_boxes(), *seen[1:]], unseen)
     assert not running.counts.sums[0][0, MISS].any() and running.counts.sums[0][1:, MISS].all()

@@ -250,48 +250,6 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
     np.testing.assert_array_equal(some.filled.sums, every.filled.sums)
 
 
-def line_of_sight() -> tuple[Rig, Explanation]:
-    """One camera; a person in the middle of the room explains all that it sees."""
-    rig = rig_of([looking("west", (-4.0, 0.0, 2.4))])
-    return rig, explained(rig, people((0.0, 0.0)), [np.zeros((96, 128), np.int64)])
-
-
-def test_explained_evidence_does_not_speak_elsewhere() -> None:
-    rig, explanation = line_of_sight()
-    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
-    fused = occupancy.fuse([flat(1.0)], explanation).dense()
-    nobodys = occupancy.fuse([flat(0.0)], explained(rig, people())).dense()
-    seen = occupancy.views[0] > 0
-    away = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0))
-    in_front = seen & (rig.grid.ground[..., 0] < -0.5)
-    np.testing.assert_allclose(fused[0][in_front], nobodys[0][in_front], rtol=1e-6)
-    assert (fused[0][in_front] < PRIOR).all() and (fused[0][seen & (away < 0.3)] > 1.0).all()
-
-
-def test_a_hidden_view_does_not_count() -> None:
-    rig, explanation = line_of_sight()
-    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
-    behind = (occupancy.views[0] > 0) & (rig.grid.ground[..., 0] > 0.6)
-    assert behind.any()
-    for value in (0.0, 1.0):
-        fused = occupancy.fuse([flat(value)], explanation).dense()
-        np.testing.assert_allclose(fused[0][behind], PRIOR, rtol=1e-6)
-
-
-def test_a_missing_box_says_less_of_somebody_hidden() -> None:
-    rig = rig_of(corner_cameras()[:1])
-    occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS, BODY)
-    explanation = explained(rig, people((0.0, 0.0)))
-    half = replace(explanation.people, visibility=np.array([[0.5]]))
-    nothing = evidence_of("boxes", rig.cameras, people())
-    whole_says = occupancy.fuse(nothing, explanation).dense()
-    half_says = occupancy.fuse(nothing, replace(explanation, people=half)).dense()
-    near_person = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
-    assert (whole_says[0][near_person] < -CONFIG.effective_observations).all()
-    np.testing.assert_allclose(half_says[0][near_person], whole_says[0][near_person] / 2, rtol=1e-5)
-    np.testing.assert_array_equal(half_says[0][~near_person], whole_says[0][~near_person])
-
-
 @compiled_only
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
@@ -308,6 +266,40 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     empty = evidence_of(kind, rig.cameras, people())
     nobody = detector_of(rig, kind).explain(empty, None)
     assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody).dense() < PRIOR).all()
+
+
+def line_of_sight() -> tuple[Rig, Explanation]:
+    """One camera; a person in the middle of the room explains all that it sees."""
+    rig = rig_of([looking("west", (-4.0, 0.0, 2.4))])
+    return rig, explained(rig, people((0.0, 0.0)), [np.zeros((96, 128), np.int64)])
+
+
+def test_explained_and_hidden_evidence_speaks_less_elsewhere() -> None:
+    rig, explanation = line_of_sight()
+    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
+    fused = occupancy.fuse([flat(1.0)], explanation).dense()
+    nobodys = occupancy.fuse([flat(0.0)], explained(rig, people())).dense()
+    seen = occupancy.views[0] > 0
+    away = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0))
+    in_front = seen & (rig.grid.ground[..., 0] < -0.5)
+    np.testing.assert_allclose(fused[0][in_front], nobodys[0][in_front], rtol=1e-6)
+    assert (fused[0][in_front] < PRIOR).all() and (fused[0][seen & (away < 0.3)] > 1.0).all()
+    behind = (occupancy.views[0] > 0) & (rig.grid.ground[..., 0] > 0.6)
+    assert behind.any()
+    for value in (0.0, 1.0):
+        fused = occupancy.fuse([flat(value)], explanation).dense()
+        np.testing.assert_allclose(fused[0][behind], PRIOR, rtol=1e-6)
+    rig = rig_of(corner_cameras()[:1])
+    occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS, BODY)
+    explanation = explained(rig, people((0.0, 0.0)))
+    half = replace(explanation.people, visibility=np.array([[0.5]]))
+    nothing = evidence_of("boxes", rig.cameras, people())
+    whole_says = occupancy.fuse(nothing, explanation).dense()
+    half_says = occupancy.fuse(nothing, replace(explanation, people=half)).dense()
+    near_person = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
+    assert (whole_says[0][near_person] < -CONFIG.effective_observations).all()
+    np.testing.assert_allclose(half_says[0][near_person], whole_says[0][near_person] / 2, rtol=1e-5)
+    np.testing.assert_array_equal(half_says[0][~near_person], whole_says[0][~near_person])
 
 
 @compiled_only

@@ -49,7 +49,7 @@ def labels_in(camera: Camera, everybody: Floats) -> Labels:
     return labels_of(camera).label(standing(everybody), likelihoods([camera], everybody)[0], None)
 
 
-def test_one_certain_pillar_is_the_outline() -> None:
+def test_a_certain_pillar_is_its_outline_and_out_of_view_none() -> None:
     camera, everybody = corner_cameras()[0], people((0.3, -0.4), (1.2, 1.1, 1.6))
     table = BodyTable.of(camera, room().grid)
     patches = pillar_patches(table, standing(everybody), EXACT, EXACT_BODY)
@@ -62,18 +62,11 @@ def test_one_certain_pillar_is_the_outline() -> None:
         share = patches.share[patches.first[j] : patches.first[j + 1]].reshape(bottom - top, right - left)
         assert np.abs(outline[top:bottom, left:right] - share).mean() < 0.005
         assert outline.sum() == outline[top:bottom, left:right].sum()
-
-
-def test_coverage_falls_off_with_uncertainty() -> None:
     camera, everybody = corner_cameras()[0], people((0.3, -0.4))
-    table = BodyTable.of(camera, room().grid)
     sharp, wide = (pillar_patches(table, standing(everybody, spread), FEW, BODY).share for spread in (0.0, 0.2))
     assert wide.min() >= 0 and wide.max() <= 1 + 1e-6
     assert sharp.max() == pytest.approx(1.0) and (wide > 0).sum() > 1.3 * (sharp > 0).sum()
     assert wide.sum() == pytest.approx(sharp.sum(), rel=0.25)
-
-
-def test_a_person_out_of_view_has_no_patch() -> None:
     view = labels_of(looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0)))
     behind = people((-1.5, 0.0))
     assert len(view.label_likelihood(standing(behind)).people.share) == 0
@@ -94,9 +87,12 @@ def test_the_product_is_the_mean_over_all_combinations_of_draws(seed: int, count
     np.testing.assert_allclose(reference.dense(shown), reference.nearest_shares(drawn, distance), atol=1e-5)
 
 
-def test_the_most_likely_label_is_the_start() -> None:
+def test_likely_labels_are_the_start_and_pairs_cost_the_same() -> None:
     shown = random_nearest(np.random.default_rng(3), 2, (3, 4))
     np.testing.assert_array_equal(most_likely_labels(shown), reference.dense(shown).argmax(0))
+    across, down = edge_costs(None, (3, 4), LabelConfig(boundary_weight=3.0, colourless_factor=0.5))
+    np.testing.assert_array_equal(across * QUANTUM, np.tile([1.5, 1.5, 1.5, 0.0], (3, 1)))
+    np.testing.assert_array_equal(down * QUANTUM, np.repeat([[1.5], [1.5], [0.0]], 4, 1))
 
 
 @drawn(20, st.integers(0, 2**32 - 1))
@@ -109,12 +105,6 @@ def test_weights_follow_the_sigmoid_and_are_not_negative(seed: int) -> None:
     for v, u in product(range(2), range(3)):
         for cost, other in ((across, image[v, u + 1]), (down, image[v + 1, u])):
             assert cost[v, u] * QUANTUM == pytest.approx(reference.adjacency(image[v, u], other, config), abs=QUANTUM)
-
-
-def test_without_colours_all_pairs_cost_the_same() -> None:
-    across, down = edge_costs(None, (3, 4), LabelConfig(boundary_weight=3.0, colourless_factor=0.5))
-    np.testing.assert_array_equal(across * QUANTUM, np.tile([1.5, 1.5, 1.5, 0.0], (3, 1)))
-    np.testing.assert_array_equal(down * QUANTUM, np.repeat([[1.5], [1.5], [0.0]], 4, 1))
 
 
 def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> LabelLikelihood:
@@ -159,13 +149,10 @@ def test_the_energy_of_the_paper_with_pruned_labels(seed: int) -> None:
     assert best_allowed == pytest.approx(best_of_all, abs=0.03)
 
 
-def test_one_person_is_their_silhouette() -> None:
+def test_people_are_silhouettes_the_nearer_in_front() -> None:
     camera, everybody = corner_cameras()[1], people((0.2, 0.1))
     seen, label = likelihoods([camera], everybody)[0], labels_in(camera, everybody)
     assert (label[seen > 0.8] == 1).all() and not label[seen < 0.2].any()
-
-
-def test_two_people_side_by_side_are_two_in_every_view() -> None:
     everybody = people((-0.5, 0.3), (0.6, -0.2, 1.8))
     views = view_labels(room(), FEW, BODY)
     for view, seen in zip(views, likelihoods(room().cameras, everybody), strict=True):
@@ -174,10 +161,7 @@ def test_two_people_side_by_side_are_two_in_every_view() -> None:
             alone = likelihoods([view.camera], everybody[j : j + 1])[0] > 0.8
             other = likelihoods([view.camera], everybody[1 - j : 2 - j])[0] > 0.2
             assert (label[alone & ~other] == j + 1).mean() > 0.95
-
-
-def test_the_nearer_of_two_hides_the_farther() -> None:
-    """Of pixels that bodies fill, as in the tests above: those at their edges are between two answers."""
+    # Of pixels that bodies fill, as in the tests above: those at their edges are between two answers.
     camera = corner_cameras()[0]
     everybody = people((-0.6, -0.6), (0.6, 0.62))  # on one line from the corner
     near, far = (likelihoods([camera], everybody[j : j + 1])[0] for j in range(2))
@@ -185,9 +169,6 @@ def test_the_nearer_of_two_hides_the_farther() -> None:
     both, behind = (near > 0.8) & (far > 0.8), (near < 0.2) & (far > 0.8)
     assert both.any() and (label[both] == 1).mean() > 0.95
     assert (label[behind] == 2).mean() > 0.9
-
-
-def test_foreground_without_a_person_is_background() -> None:
     camera, everybody = corner_cameras()[2], people((-0.5, -0.5))
     blotch = likelihoods([camera], everybody)[0]
     blotch[:20, :20] = 1.0
@@ -196,7 +177,7 @@ def test_foreground_without_a_person_is_background() -> None:
     np.testing.assert_array_equal(labels_in(camera, everybody), labels_in(camera, everybody))
 
 
-def test_similar_colours_fill_holes_and_reject_specks() -> None:
+def test_colours_fill_holes_reject_specks_and_make_borders() -> None:
     camera, everybody = corner_cameras()[0], people((0.0, 0.0))
     seen = likelihoods([camera], everybody)[0]
     rows, columns = np.nonzero(seen > 0.5)
@@ -204,14 +185,11 @@ def test_similar_colours_fill_holes_and_reject_specks() -> None:
     seen[hole], seen[speck] = 0.0, 1.0
     label = labels_of(camera).label(standing(everybody), seen, np.full((96, 128, 3), 80, np.uint8))
     assert label[hole] == 1 and label[speck] == 0
-
-
-def test_a_border_between_two_people_follows_the_colours() -> None:
     camera, everybody = corner_cameras()[0], people((-0.1, 0.35), (0.35, -0.1))
-    seen = likelihoods([camera], everybody)[0]
     near, far = (likelihoods([camera], everybody[j : j + 1])[0] > 0.5 for j in range(2))
     image = np.full((96, 128, 3), 60, np.uint8)
     image[near], image[far & ~near] = 20, 200
+    seen = likelihoods([camera], everybody)[0]
     view = labels_of(camera)
     off = everybody + np.array([0.06, -0.06, 0.0])  # to the side, as the camera sees it
     truth = np.where(near, 1, np.where(far, 2, 0))

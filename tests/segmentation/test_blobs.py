@@ -33,7 +33,7 @@ def ground_labels(label: Labels, log_odds: Singles) -> Labels:
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 
 
-def test_cells_near_a_person_move_with_them() -> None:
+def test_cells_near_a_person_move_with_them_if_they_do() -> None:
     now = np.array([[0.55, 0.55], [1.45, 0.95]])
     then = np.array([[1.25, 0.85], [0.85, 0.45]])
     motion = motion_field((now, np.array([4, 7])), (then, np.array([7, 4])), 0.25, GRID.cell, GRID.ground)
@@ -41,12 +41,9 @@ def test_cells_near_a_person_move_with_them() -> None:
     assert motion[6, 6].tolist() == [-1, 3] and not motion[0, 0].any()
     away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - now, -1, 0)).min(2)
     np.testing.assert_array_equal(motion.any(2), away <= 0.25)
-
-
-def test_a_track_not_detected_again_does_not_move() -> None:
-    for now, then in (([3], []), ([3], [9]), ([], [3])):
-        here = np.full((len(now), 2), 0.55), np.array(now, np.int64)
-        there = np.full((len(then), 2), 1.0), np.array(then, np.int64)
+    for first, second in (([3], []), ([3], [9]), ([], [3])):
+        here = np.full((len(first), 2), 0.55), np.array(first, np.int64)
+        there = np.full((len(second), 2), 1.0), np.array(second, np.int64)
         motion = motion_field(here, there, 0.3, GRID.cell, GRID.ground)
         assert motion.shape == (15, 20, 2) and not motion.any()
 
@@ -67,7 +64,7 @@ def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats |
     return find_blobs(label.astype(np.int32), log_odds, ground, tracks, 0.4, GroundPatches.whole(GRID))
 
 
-def test_a_person_is_a_blob() -> None:
+def test_a_person_is_a_blob_and_a_component_by_itself_too() -> None:
     place = (0.85, 0.75)
     found = blobs_of(disc(place, tall=2), place)
     assert (found.person.tolist(), found.track.tolist()) == ([0], [11])
@@ -75,9 +72,13 @@ def test_a_person_is_a_blob() -> None:
     assert found.extent[0] == pytest.approx((found.cells == 1).sum() * 0.01)
     np.testing.assert_array_equal(found.cells > 0, disc(place).any(0))
     assert len(found.touches) == 0
+    found = blobs_of(disc((0.45, 0.75), (1.55, 0.75)), (0.45, 0.75))
+    assert (found.person.tolist(), found.track.tolist()) == ([0, -1], [11, UNASSIGNED])
+    assert len(found.touches) == 0
+    np.testing.assert_allclose(found.ground[found.person.tolist().index(-1)], (1.55, 0.75), atol=1e-9)
 
 
-def test_touching_people_are_two_blobs() -> None:
+def test_touching_people_are_two_blobs_and_no_cells_are_one() -> None:
     left, right = (0.65, 0.75), (1.05, 0.75)
     found = blobs_of(disc(left, right), right, left)
     assert sorted(found.person.tolist()) == [0, 1] and found.touches.tolist() == [[0, 1]]
@@ -86,16 +87,6 @@ def test_touching_people_are_two_blobs() -> None:
         cells = GRID.ground[found.cells == blob + 1]
         assert (np.abs(cells[:, 0] - x) <= 0.2 + 1e-9).all()
     np.testing.assert_array_equal(found.cells > 0, disc(left, right).any(0))
-
-
-def test_a_component_without_a_detection_is_kept() -> None:
-    found = blobs_of(disc((0.45, 0.75), (1.55, 0.75)), (0.45, 0.75))
-    assert (found.person.tolist(), found.track.tolist()) == ([0, -1], [11, UNASSIGNED])
-    assert len(found.touches) == 0
-    np.testing.assert_allclose(found.ground[found.person.tolist().index(-1)], (1.55, 0.75), atol=1e-9)
-
-
-def test_a_detection_without_cells_is_a_blob_without_extent() -> None:
     found = blobs_of(disc((0.45, 0.75)), (0.45, 0.75), (1.8, 0.2))
     assert found.person.tolist() == [0, 1] and found.track.tolist() == [11, 12]
     assert found.ground[1].tolist() == [1.8, 0.2] and found.extent[0] > found.extent[1] == 0
@@ -104,7 +95,7 @@ def test_a_detection_without_cells_is_a_blob_without_extent() -> None:
     assert empty.touches.shape == (0, 2)
 
 
-def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
+def test_blobs_are_of_tracks_by_most_mass_and_detections() -> None:
     label = np.zeros(GRID.shape, np.int32)
     label[1, 3, 3], label[1, 3, 8] = 4, 4
     label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
@@ -112,9 +103,6 @@ def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
     found = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, GroundPatches.whole(GRID))
     assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED] and found.person.tolist() == [-1, -1, -1]
     np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
-
-
-def test_a_column_belongs_to_the_label_with_most_mass() -> None:
     label = np.zeros(GRID.shape, np.int32)
     label[:3, 5, 5], label[3, 5, 5] = 2, 1
     for strength, whose in ((1.0, 2), (9.0, 1)):
@@ -123,9 +111,6 @@ def test_a_column_belongs_to_the_label_with_most_mass() -> None:
         found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, GroundPatches.whole(GRID))
         assert found.track.tolist() == ([1] if whose == 1 else [2, 1])  # a detection without cells comes last
         assert found.person.tolist() == ([0] if whose == 1 else [-1, 0])
-
-
-def test_a_blob_holds_the_detection_inside_it() -> None:
     label = disc((0.45, 0.75)).astype(np.int32) * 3
     for x, person in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
         place, track = np.array([[x, 0.75]]), np.array([3])

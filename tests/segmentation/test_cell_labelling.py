@@ -98,20 +98,14 @@ def share_at(places: PredictedPlaces, *cells: tuple[float, float, float], appear
     return track_shares(np.zeros(len(cells), np.int64), np.column_stack([x, y]), z, places, BODY, appearance)
 
 
-def test_tracks_beyond_the_gate_are_inadmissible() -> None:
+def test_costs_of_labels_by_gate_and_appearance_in_quanta() -> None:
     share = share_at(places_at((0.5, 0.7), (1.9, 0.7)), (0.5, 0.7, 1.0), (1.9, 0.8, 1.0), (1.2, 0.0, 1.0))
     assert (share > 0).tolist() == [[True, False, True], [False, True, True], [False, False, True]]
     assert share[2, -1] == 1.0 and share[0, 0] > 0.95
-
-
-def test_appearance_separates_tracks_in_one_place() -> None:
     places = places_at((1.0, 0.7), (1.0, 0.7))
     appearance = np.array([[2.0, -2.0], [-2.0, 2.0]])
     share = share_at(places, (1.0, 0.7, 1.0), (1.0, 0.7, 1.0), appearance=appearance)
     np.testing.assert_allclose(np.log(share[:, 0] / share[:, 1]), [4.0, -4.0])
-
-
-def test_costs_of_labels_in_quanta() -> None:
     subgraph = CellSubset(np.array([3, 5]), np.array([0]), np.array([1]), np.array([7]), np.array([2, 0]))
     energy = label_energy(np.array([1000, -50]), np.array([[0.5, 0.0, 0.5], [0.0, 1.0, 0.0]]), subgraph)
     half = round(np.log(2) / QUANTUM)
@@ -157,7 +151,7 @@ def walking(tracks: Floats) -> PredictedPlaces:
     return replace(places_at(*tracks[0], frames=len(tracks)), ground=tracks)
 
 
-def test_touching_people_are_divided_as_in_the_truth() -> None:
+def test_people_are_divided_by_expansion_only_where_they_touch() -> None:
     tracks = meeting()
     truth = bodies(tracks)
     energy = window_of(truth)
@@ -167,6 +161,12 @@ def test_touching_people_are_divided_as_in_the_truth() -> None:
     both = (truth > 0) & (division.label > 0)
     assert (division.label[both] == truth[both]).mean() > 0.98 and both.sum() > 0.98 * (truth > 0).sum()
     assert not division.label[~occupied].any()
+    tracks = meeting() + np.array([[-0.6, 0.0], [0.6, 0.0]])
+    truth = bodies(tracks)
+    occupied, division = divided(window_of(truth), walking(tracks))
+    assert division.cells == 0 and (division.label[occupied] != 0).all()
+    both = (truth > 0) & occupied
+    np.testing.assert_array_equal(division.label[both], truth[both])
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -179,7 +179,7 @@ def test_both_solvers_give_the_same_labels(seed: int) -> None:
     assert ours.cells == theirs.cells > 0
 
 
-def test_a_track_missed_in_some_frames_keeps_its_cells() -> None:
+def test_tracks_keep_cells_where_missed_not_where_elsewhere() -> None:
     tracks = meeting()
     truth = bodies(tracks)
     seen = np.ones(tracks.shape[:2], bool)
@@ -187,30 +187,7 @@ def test_a_track_missed_in_some_frames_keeps_its_cells() -> None:
     _, division = divided(window_of(truth), walking(tracks), seen)
     missed = truth[2] == 2
     assert (division.label[2][missed] == 2).mean() > 0.9
-
-
-def test_separate_tracks_need_no_expansion() -> None:
-    tracks = meeting() + np.array([[-0.6, 0.0], [0.6, 0.0]])
-    truth = bodies(tracks)
-    occupied, division = divided(window_of(truth), walking(tracks))
-    assert division.cells == 0 and (division.label[occupied] != 0).all()
-    both = (truth > 0) & occupied
-    np.testing.assert_array_equal(division.label[both], truth[both])
-
-
-def test_unclaimed_cells_are_unassigned() -> None:
-    three = np.concatenate([meeting(), np.tile([0.3, 0.3], (5, 1, 1))], 1)
-    truth = bodies(three)
-    _, division = divided(window_of(truth), walking(meeting()))
-    unknown = truth == 3
-    assert (division.label[unknown] == UNASSIGNED).mean() > 0.97
-    lonely, alone = divided(window_of(bodies(three[:, 2:])), walking(meeting()))
-    assert set(np.unique(alone.label[lonely])) == {UNASSIGNED}
-
-
-def test_a_track_detected_elsewhere_has_no_cells_here() -> None:
-    """Track 2 is expected, and found, off the grid in one frame: what stands here then is of track 1."""
-    tracks = meeting()
+    # Track 2 is expected, and found, off the grid in one frame: what stands here then is of track 1.
     energy = window_of(bodies(tracks))
     gone = tracks.copy()
     gone[2, 1] = 3.0, 0.7
@@ -218,7 +195,14 @@ def test_a_track_detected_elsewhere_has_no_cells_here() -> None:
     assert set(np.unique(division.label[2])) <= {0, 1, UNASSIGNED} and 2 in division.label[1]
 
 
-def test_an_empty_window() -> None:
+def test_unclaimed_cells_are_unassigned_and_empty_windows() -> None:
+    three = np.concatenate([meeting(), np.tile([0.3, 0.3], (5, 1, 1))], 1)
+    truth = bodies(three)
+    _, division = divided(window_of(truth), walking(meeting()))
+    unknown = truth == 3
+    assert (division.label[unknown] == UNASSIGNED).mean() > 0.97
+    lonely, alone = divided(window_of(bodies(three[:, 2:])), walking(meeting()))
+    assert set(np.unique(alone.label[lonely])) == {UNASSIGNED}
     energy = window_of(np.zeros((2, *GRID.shape), np.int32))
     occupied, division = divided(energy, places_at((1.0, 0.7), frames=2))
     assert not occupied.any()
@@ -252,7 +236,7 @@ def detections(*found: tuple[int, int, float, float]) -> DetectionHistory:
     return DetectionHistory(frame, chain, rows[:, 2:], np.tile(np.eye(2) * 0.01, (n, 1, 1)), np.full(n, 1.8))
 
 
-def test_places_between_and_after_detections() -> None:
+def test_places_between_and_after_detections_of_tracks() -> None:
     history = detections((14, 7, 1.4, 0.0), (10, 7, 1.0, 0.0), (12, 3, 0.0, 5.0))
     places = predicted_places(history, 8, 20, 8.0, CONFIG)
     assert places.track.tolist() == [3, 7]
@@ -267,6 +251,9 @@ def test_places_between_and_after_detections() -> None:
     assert spread[2] == spread[6] == pytest.approx(0.01)
     assert spread[2] < spread[3] < spread[4] > spread[5] and spread[6] < spread[7] < spread[8]
     assert (places.height[places.expected] == 1.8).all()
+    nothing = together([earlier_detections([], 4, 1.7, MotionConfig()), detections()])
+    places = predicted_places(nothing, 4, 9, 8.0, CONFIG)
+    assert places.ground.shape == (5, 0, 2) and places.expected.shape == (5, 0)
 
 
 def test_places_are_carried_from_the_window_before() -> None:
@@ -280,9 +267,3 @@ def test_places_are_carried_from_the_window_before() -> None:
     alone = predicted_places(before, 10, 12, 8.0, CONFIG)
     np.testing.assert_allclose(alone.ground[:, 0], [[1.0, 1.0], [1.1, 1.0]])
     assert (alone.height == 1.7).all()
-
-
-def test_no_track_is_predicted() -> None:
-    nothing = together([earlier_detections([], 4, 1.7, MotionConfig()), detections()])
-    places = predicted_places(nothing, 4, 9, 8.0, CONFIG)
-    assert places.ground.shape == (5, 0, 2) and places.expected.shape == (5, 0)

@@ -63,42 +63,33 @@ def test_who_stays_and_who_goes(
     assert real[(found.track < 2) & (found.evidence > 0)].all() and (~real).sum() == gone
 
 
-def test_the_height_prior_is_that_of_the_detector() -> None:
-    found = replace(candidates(*walk(np.full(9, 3.0), off=0.1)), height=np.full(9, 1.05))
-    assert decide(found).real.all()
-
-
-def test_a_certain_path_of_rejected_candidates_is_a_person() -> None:
+def test_a_certain_path_of_candidates_is_a_person_none_nobody() -> None:
     for evidence, paths in ((7.0, 1), (2.0, 0)):
         found = candidates(*walk(np.full(9, evidence), track=0), *walk(np.full(9, 9.0), off=1.0))
         decision = decide(found)
         assert decision.real.all()
         rows = found_by_window(found, decision)
         assert len(rows) == paths and all((found.ground[own, 1] == 0).all() and len(own) == 9 for own in rows)
+    none, numbers = np.zeros(0), np.zeros(0, np.int64)
+    empty = WindowCandidates(numbers, np.zeros((0, 2)), np.zeros((0, 2, 2)), none, none, numbers)
+    assert len(decide(empty).real) == 0
+    found = replace(candidates(*walk(np.full(9, 3.0), off=0.1)), height=np.full(9, 1.05))
+    assert decide(found).real.all()
 
 
-def test_two_candidates_of_one_body_exclude_each_other() -> None:
+def test_candidates_are_added_in_paths_one_for_a_body() -> None:
     weak = np.array([12.0, 12.0, 3.0, 3.0, 3.0, 3.0, 3.0, 12.0, 12.0])
     double = [(t, x, 0.2, 2.0, 0) for t, (x, _) in enumerate(WALK) if 2 <= t <= 6]
     found = candidates(*walk(weak), *double)
     decision = decide(found)
     assert np.bincount(found.frame[decision.real]).tolist() == [1] * 9
     assert (found.ground[decision.real, 1] == 0).all() and decision.gap == 0
-
-
-def test_candidates_are_added_inside_paths() -> None:
     weak = np.array([3.0, 3.0, 12.0, 12.0, 3.0, 12.0, 12.0, 3.0, 3.0])
     found = candidates(*walk(weak))
     decision = decide(found)
     assert decision.real.all()
     for inside, expected in ((True, [1] * 7 + [0] * 2), (False, [0] * 2 + [1] * 5 + [0] * 2)):
         assert tracks_of(found, decision, np.full(9, inside)).tolist() == expected
-
-
-def test_no_candidates() -> None:
-    none, numbers = np.zeros(0), np.zeros(0, np.int64)
-    empty = WindowCandidates(numbers, np.zeros((0, 2)), np.zeros((0, 2, 2)), none, none, numbers)
-    assert len(decide(empty).real) == 0
 
 
 def greatest_gain(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> float:

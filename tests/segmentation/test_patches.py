@@ -66,7 +66,7 @@ def test_patches_are_enough(weak: float, monkeypatch: pytest.MonkeyPatch) -> Non
             assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
 
 
-def test_patches_are_apart_and_hold_what_is_marked() -> None:
+def test_patches_are_apart_and_hold_marks_and_the_way_ahead() -> None:
     rng = np.random.default_rng(5)
     for _ in range(20):
         squares = no_squares(GRID)
@@ -87,9 +87,6 @@ def test_patches_are_apart_and_hold_what_is_marked() -> None:
         beside = np.pad(grown, 1, constant_values=1)
         least = sliding_window_view(beside, (3, 3)).min((2, 3))
         np.testing.assert_array_equal(edge, (grown == 1) & (least == 0))
-
-
-def test_the_way_to_the_next_frame_is_one_patch() -> None:
     here, ahead = np.array([[-4.0, -4.0], [9.0, 9.0]]), np.array([[4.0, 3.0], [9.0, 9.0]])
     assert len(GroundPatches.of(GRID, people_squares(GRID, here, ahead, 0.4)).rectangles) == 1
     assert GroundPatches.of(GRID, no_squares(GRID)).place.tolist() == [[-1]]

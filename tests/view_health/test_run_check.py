@@ -45,20 +45,11 @@ def test_the_wrong_view_is_the_one_aside_and_to_which_side(kind: str, pixels: fl
     assert aside[1] * pixels < 0
 
 
-def test_who_stands_before_another_tells_nothing() -> None:
-    camera = room().cameras[0]
-    place = np.array([-0.6, -0.6])
-    away = place - camera.centre[:2]
-    behind = place + 1.6 * away / np.hypot(*away)
-    aside = residuals(room(), "pixels", people(tuple(place), tuple(behind)))
-    assert np.isnan(aside[0]) and np.isfinite(aside[1:]).any()
-
-
 def windows(seed: int, count: int = 60) -> Floats:
     return np.random.default_rng(seed).normal(0, 0.03, (count, 4))
 
 
-def test_views_are_named_beyond_a_cell_alone() -> None:
+def test_views_are_named_beyond_a_cell_and_by_who_is_open() -> None:
     aside = windows(1)
     assert views_off(aside, CELL) == []
     aside[:, 2] -= 0.18
@@ -70,6 +61,12 @@ def test_views_are_named_beyond_a_cell_alone() -> None:
     assert [one.view for one in views_off(aside, CELL)] == [2, 1]
     aside[3:, 1:3] = np.nan
     assert views_off(aside, CELL) == [] and views_off(np.full((40, 3), np.nan), CELL) == []
+    camera = room().cameras[0]
+    place = np.array([-0.6, -0.6])
+    away = place - camera.centre[:2]
+    behind = place + 1.6 * away / np.hypot(*away)
+    aside = residuals(room(), "pixels", people(tuple(place), tuple(behind)))
+    assert np.isnan(aside[0]) and np.isfinite(aside[1:]).any()
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -132,26 +129,20 @@ def test_other_steps_are_no_knocks(agreement: Floats) -> None:
     assert find_knocks(agreement) == []
 
 
-def test_frames_without_people_and_wild_frames_do_not_matter() -> None:
+def test_two_cameras_by_time_harmless_steps_and_wild_frames() -> None:
+    agreement = 4.0 + correlated(900, 5, 4)
+    agreement[300:, 0] -= 5.0
+    agreement[600:, 3] -= 5.0
+    assert [(knock.view, round(knock.frame, -2)) for knock in find_knocks(agreement)] == [(0, 300), (3, 600)]
+    agreement = 0.01 * correlated(400, 3, 5)
+    agreement[200:, 1] -= 0.2
+    assert len(find_knocks(agreement)) == 1 and find_knocks(agreement, least=0.5) == []
     agreement = 4.0 + correlated(600, 3, 3)
     agreement[100:180] = np.nan
     agreement[::50, 0] = -1e6
     agreement[400:, 1] -= 4.0
     (knock,) = find_knocks(agreement)
     assert knock.view == 1 and abs(knock.frame - 400) <= 3
-
-
-def test_two_cameras_are_told_apart_by_time() -> None:
-    agreement = 4.0 + correlated(900, 5, 4)
-    agreement[300:, 0] -= 5.0
-    agreement[600:, 3] -= 5.0
-    assert [(knock.view, round(knock.frame, -2)) for knock in find_knocks(agreement)] == [(0, 300), (3, 600)]
-
-
-def test_a_step_that_harms_nobody_is_none() -> None:
-    agreement = 0.01 * correlated(400, 3, 5)
-    agreement[200:, 1] -= 0.2
-    assert len(find_knocks(agreement)) == 1 and find_knocks(agreement, least=0.5) == []
 
 
 def rooms() -> list[Bytes]:
@@ -168,13 +159,7 @@ def filmed(room: Bytes, frame: int, shift: int, lots: np.random.Generator) -> By
     return np.asarray(np.clip(image + lots.normal(0, 3, image.shape), 0, 255), np.uint8)
 
 
-def test_a_shifted_background_is_measured() -> None:
-    room, lots = rooms()[0], np.random.default_rng(0)
-    for shift in (-7, 0, 2):
-        np.testing.assert_allclose(background_shift(room, filmed(room, 5, shift, lots)), [shift, 0], atol=0.3)
-
-
-def test_a_simulated_knock_is_reported_with_its_frame() -> None:
+def test_knocks_are_reported_and_background_shifts_measured() -> None:
     lots = np.random.default_rng(1)
     shifts = np.array(
         [
@@ -184,6 +169,9 @@ def test_a_simulated_knock_is_reported_with_its_frame() -> None:
     ).T
     (knock,) = find_knocks(shifts, least=0.5)
     assert (knock.view, knock.frame) == (1, 47) and knock.after == pytest.approx(-2.0, abs=0.4)
+    room, lots = rooms()[0], np.random.default_rng(0)
+    for shift in (-7, 0, 2):
+        np.testing.assert_allclose(background_shift(room, filmed(room, 5, shift, lots)), [shift, 0], atol=0.3)
 
 
 HEIGHT = 1.7
@@ -230,12 +218,16 @@ def with_boxes(one: SourceSummary, pixel: Floats, later: int = 0) -> SourceSumma
     return replace(one, detections=replace(one.detections, kept=kept))
 
 
-def test_what_is_right_is_not_doubted(recording: Recording, summaries: list[SourceSummary]) -> None:
+def test_what_is_right_is_not_doubted_but_a_pace_of_nobody(
+    recording: Recording, summaries: list[SourceSummary]
+) -> None:
     assert recording_warnings(recording, summaries) == []
     chance = np.random.default_rng(5)
     assert not warnings_of(recording, summaries, lambda boxes, _: boxes + chance.normal(0, 2, boxes.shape))
     kept = replace(recording, rig=replace(recording.rig, frame_rate=1.3 * recording.rig.frame_rate))
     assert not warnings_of(kept, summaries, lambda boxes, _: boxes * chance.normal(1, 0.03, boxes.shape))
+    for one in summaries:
+        assert "are frame_rate and" in pace_warnings(1000 * recording.rig.frame_rate, *one.feet, HEIGHT)[0]
 
 
 SHIFTED = "people stand where other cameras see them no more often than by chance"
@@ -261,20 +253,12 @@ def test_boxes_in_another_form_are_named(
     assert named in warnings_of(recording, summaries, changed)
 
 
-def test_cameras_that_never_agree_are_named(recording: Recording, summaries: list[SourceSummary]) -> None:
+def test_cameras_that_never_agree_and_one_file_are_named(recording: Recording, summaries: list[SourceSummary]) -> None:
     first, *others = summaries
     assert first.detections is not None
     late = with_boxes(first, first.boxes, later=first.detections.frames // 2)
     (said,) = (words for words in recording_warnings(recording, [late, *others]) if SHIFTED in words)
     assert said.startswith(first.camera.name)
-
-
-def test_a_pace_of_no_people_is_named(recording: Recording, summaries: list[SourceSummary]) -> None:
-    for one in summaries:
-        assert "are frame_rate and" in pace_warnings(1000 * recording.rig.frame_rate, *one.feet, HEIGHT)[0]
-
-
-def test_one_file_for_two_cameras_is_named(recording: Recording, summaries: list[SourceSummary]) -> None:
     boxes = [one.boxes for one in summaries]
     names = [camera.name for camera in recording.rig.cameras]
     assert twin_warnings(names, boxes) == []

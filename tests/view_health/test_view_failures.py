@@ -156,7 +156,6 @@ KNOCKED = 2
 
 
 def aside(view: ViewEvidence, pixels: int) -> ViewEvidence:
-    """What a camera shows that is pushed aside."""
     if isinstance(view, Boxes):
         return replace(view, pixel=view.pixel + np.array([pixels, 0, 0, 0]))
     return np.roll(np.asarray(view), pixels, axis=1)
@@ -224,10 +223,6 @@ def test_what_may_be_something_else_knocks_no_view(views: int, standing: Floats,
     watch.compare(seen, 30, standing)
     seen[-1] = level * np.asarray(aside(seen[-1], 7))
     assert watch.compare(seen, 3, standing) == [False] * views
-
-
-def test_a_view_that_stands_beside_from_the_start_is_not_knocked() -> None:
-    assert Watch("pixels").compare(knocked("pixels"), 30) == [False] * 4
 
 
 @pytest.mark.parametrize("kind", ["pixels", *in_ci("boxes")])
@@ -298,8 +293,9 @@ def test_what_is_no_frozen_view(kinds: tuple[str, ...], counts: list[list[int]],
         assert not np.any(frozen_views(kind, counts, rate))
 
 
-def test_a_view_back_from_a_gap_is_not_frozen() -> None:
+def test_views_back_or_beside_from_the_start_are_right() -> None:
     frozen = FrozenViews(2, 10.0)
     for k in range(20):
         own = None if k < 10 else view("masks", 5 + k)
         assert (frozen.without([view("masks", 1 + k), own])[1] is None) == (own is None)
+    assert Watch("pixels").compare(knocked("pixels"), 30) == [False] * 4
