@@ -33,7 +33,6 @@ def films(rig: Rig, frames: int = FRAMES) -> list[list[Bytes]]:
 
 
 def empty_scene(size: tuple[int, int]) -> Bytes:
-    """A wall without anybody."""
     u, v = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
     return np.stack([170 + 20 * np.sin(u / 9 + k) + 10 * np.cos(v / 7) for k in range(3)], -1).astype(np.uint8)
 

@@ -19,8 +19,6 @@ _PATIENCE = 60.0  # seconds for one answer
 
 @dataclass
 class Page:
-    """An open page."""
-
     process: subprocess.Popen[bytes]
     into: int
     out: int
@@ -33,7 +31,6 @@ class Page:
     _rest: bytes = b""
 
     def open(self, path: Path, fragment: str = "") -> None:
-        """Load a page and wait until it is loaded."""
         target = self._ask("Target.createTarget", {"url": "about:blank"})["targetId"]
         attached = self._ask("Target.attachToTarget", {"targetId": target, "flatten": True})
         self._session = attached["sessionId"]

@@ -13,8 +13,6 @@ from recordings import ENVIRONMENT
 
 
 class Cluster(NamedTuple):
-    """A scheduler and its worker processes."""
-
     address: str
     workers: list[subprocess.Popen[bytes]]
 

@@ -52,5 +52,4 @@ def follow(
 
 
 def rows_of(commits: Sequence[Commit]) -> Rows:
-    """Rows of all commits."""
     return np.concatenate([commit.trajectory for commit in commits])

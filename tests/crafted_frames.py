@@ -38,16 +38,12 @@ class CraftedFrame:
         )  # fmt: skip
 
     def score(self, members: Sequence[int] | Ints) -> float:
-        """Score of a set by the kernels."""
         none, nothing = np.zeros(0, np.int64), np.zeros((0, 0))
         chosen = np.array(members, np.int64)
         return fill_gains(chosen, none, self.problem(), np.zeros(0), nothing, nothing.astype(int), none)
 
     def best_set(
-        self,
-        start: Sequence[int] = (),
-        sweeps: int = 4,
-        enumeration_limit: int = ENUMERATION_LIMIT,
+        self, start: Sequence[int] = (), sweeps: int = 4, enumeration_limit: int = ENUMERATION_LIMIT
     ) -> list[int]:
         """The set that the search ends with."""
         members = np.zeros(len(self.size_prior) + 1, np.int64)

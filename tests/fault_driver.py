@@ -130,5 +130,4 @@ class Driver:
         return Trial(status, Path(f"{self._log}.err").read_text(), tuple(calls))
 
     def close(self) -> None:
-        """End the process."""
         self._process.communicate()

@@ -20,7 +20,6 @@ ELEMENTS = ("x264enc", "rtph264pay", "avidemux", "jpegdec", "appsrc")
 
 
 def main() -> None:
-    """Serve until killed."""
     port, *streams = sys.argv[1:]
     try:
         import gi

@@ -62,17 +62,14 @@ def test_a_prediction_is_a_mixture(data: st.DataObject) -> None:
     np.testing.assert_allclose(prediction.density(100 * place), expected, rtol=1e-9, atol=1e-300)
 
 
-def test_a_prediction_goes_on_at_constant_velocity() -> None:
+def test_predictions_go_on_and_who_is_ahead_is_faster() -> None:
     walking = Particles(np.array([[1.0, 2.0]]), np.array([[0.8, -0.4]]), np.ones(1))
     prediction = Prediction.of(walking, np.eye(2), MOTION)
     np.testing.assert_allclose(prediction.mean, [1.1, 1.95])
     drawn = prediction.draw(4000, np.random.default_rng(1))
     np.testing.assert_allclose(drawn.mean(0), [1.1, 1.95], atol=0.02)
     np.testing.assert_allclose(np.cov(drawn.T), prediction.covariance, atol=0.003)
-
-
-def test_who_is_ahead_of_what_was_foretold_is_faster() -> None:
-    """The velocity follows the place as the covariance of a random walk of the velocity says."""
+    # The velocity follows the place as the covariance of a random walk of the velocity says.
     still = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1))
     prediction = Prediction.of(still, np.eye(2), MOTION)
     place = np.tile([0.2, 0.0], (4000, 1))
@@ -109,18 +106,26 @@ def test_the_jacobians_are_slopes_of_the_homography(camera: Camera, x: float, y:
     np.testing.assert_allclose(view.ground_slope(pixel)[0] @ view.pixel_slope(ground[0]), np.eye(2), atol=1e-7)
 
 
-def test_a_view_shows_those_in_its_image_and_no_ground_above_it() -> None:
+def test_a_view_shows_those_in_its_image_and_the_front_one() -> None:
     assert (np.abs(VIEWS[0].to_ground(np.array([[64.0, -400.0]]))) > 1e3).all()
     assert np.isfinite(VIEWS[0].ground_slope(np.array([[64.0, -400.0]]))).all()
     assert VIEWS[0].shows(np.zeros(2), 1.7, 0.5) and not VIEWS[0].shows(np.array([-3.4, -3.3]), 1.7, 0.5)
+    # The first corner camera stands at (-3.5, -3.5).
+    boxes = in_front(np.array([[0.5, 0.5], [0.0, 0.0], [1.0, -1.0]]), np.full(3, 1.7), VIEWS[0])
+    np.testing.assert_allclose(boxes[0], VIEWS[0].boxes(np.zeros((1, 2)), 1.7))
+    assert [len(b) for b in boxes] == [1, 0, 0]
 
 
-def test_bins_of_colours() -> None:
+def test_bins_of_colours_and_distances_of_histograms() -> None:
     """Colours on the border of two bins may fall in either."""
     for colour in np.ndindex(8, 8, 8):
         blue, green, red = ((np.array(colour) * 4 + 0.5) / 32).tolist()
         nearly = {plain.hsv_bin((blue + off, green, red)) for off in (-1e-9, 1e-9)}
         assert HSV_BINS[tuple(4 * c for c in colour)] in nearly | {plain.hsv_bin((blue, green, red))}
+    one, other = np.zeros((2, PARTS, BINS)), np.zeros((PARTS, BINS))
+    one[0, :, 3] = other[:, 3] = 1.0
+    one[1, :, 7] = 1.0
+    np.testing.assert_allclose(squares(one, other), [[0.0] * PARTS, [1.0] * PARTS])
 
 
 @drawn(10, st.data())
@@ -138,13 +143,6 @@ def test_histograms(data: st.DataObject) -> None:
     assert not colours[-1].any() and not share[-1].any()
 
 
-def test_squared_distances_of_histograms() -> None:
-    one, other = np.zeros((2, PARTS, BINS)), np.zeros((PARTS, BINS))
-    one[0, :, 3] = other[:, 3] = 1.0
-    one[1, :, 7] = 1.0
-    np.testing.assert_allclose(squares(one, other), [[0.0] * PARTS, [1.0] * PARTS])
-
-
 def test_colours_prefer_the_target_and_ignore_hidden_parts() -> None:
     standing = people((0.0, 0.0), (1.2, -0.6))
     target = known(standing)
@@ -158,13 +156,6 @@ def test_colours_prefer_the_target_and_ignore_hidden_parts() -> None:
     unseen, none = covered.likelihood(np.zeros((1, 2)))
     np.testing.assert_allclose(unseen, covered.hidden)
     assert none[0] == 0.0
-
-
-def test_who_stands_in_front() -> None:
-    """The first corner camera stands at (-3.5, -3.5)."""
-    boxes = in_front(np.array([[0.5, 0.5], [0.0, 0.0], [1.0, -1.0]]), np.full(3, 1.7), VIEWS[0])
-    np.testing.assert_allclose(boxes[0], VIEWS[0].boxes(np.zeros((1, 2)), 1.7))
-    assert [len(b) for b in boxes] == [1, 0, 0]
 
 
 @drawn(15, st.data(), st.sampled_from(([0.1, 0.3, 0.0, 0.2], [0.0] * 4)))
@@ -190,8 +181,15 @@ def test_targets_exclude_each_other(data: st.DataObject) -> None:
     np.testing.assert_allclose(exclusion(ground, others, 0.3), plainly, atol=1e-6)
 
 
-def test_a_round_brings_the_ground_to_what_the_views_see() -> None:
-    """The target has gone a step further than it should have; all views see it."""
+def test_a_round_brings_the_ground_to_the_views_if_any() -> None:
+    walking = Particles(np.tile([0.0, 0.0], (30, 1)), np.tile([0.8, 0.0], (30, 1)), np.full(30, 1 / 30))
+    star = Star(walking, (None,) * 4, np.zeros(4))
+    rounds = Rounds(star, [None] * 4, MOTION, FEW, np.random.default_rng(0))
+    rounds.advance([])
+    moved = rounds.settled()
+    np.testing.assert_allclose(moved.ground.mean, [0.1, 0.0], atol=0.1)
+    assert moved.views == (None,) * 4
+    # The target has gone a step further than it should have; all views see it.
     target, standing = known(people((0.0, 0.0))), people((0.25, -0.15))
     seen = target_likelihoods([target], VIEWS, images_of(standing), MOTION, FEW)
     star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
@@ -201,10 +199,7 @@ def test_a_round_brings_the_ground_to_what_the_views_see() -> None:
         assert own is not None
         np.testing.assert_allclose(view.to_ground(own.mean[None])[0], [0.25, -0.15], atol=0.15)
         assert own.weight.sum() == pytest.approx(1.0)
-
-
-def test_who_is_hidden_in_one_view_is_led_there_by_the_others() -> None:
-    """The first view's image is blank: its particles go where the others see the target."""
+    # The first view's image is blank: its particles go where the others see the target.
     target, standing = known(people((0.0, 0.0))), people((0.2, 0.2))
     images = images_of(standing)
     images[0] = np.full((*SIZE[::-1], 3), FLOOR, np.uint8)
@@ -217,42 +212,8 @@ def test_who_is_hidden_in_one_view_is_led_there_by_the_others() -> None:
     np.testing.assert_allclose(star.ground.mean, [0.2, 0.2], atol=0.1)
 
 
-def test_without_any_view_the_ground_goes_on_as_foretold() -> None:
-    walking = Particles(np.tile([0.0, 0.0], (30, 1)), np.tile([0.8, 0.0], (30, 1)), np.full(30, 1 / 30))
-    star = Star(walking, (None,) * 4, np.zeros(4))
-    rounds = Rounds(star, [None] * 4, MOTION, FEW, np.random.default_rng(0))
-    rounds.advance([])
-    moved = rounds.settled()
-    np.testing.assert_allclose(moved.ground.mean, [0.1, 0.0], atol=0.1)
-    assert moved.views == (None,) * 4
-
-
 QUICK = replace(CONFIG, belief=FEW)
 PASSING = ((-0.9, -0.3, 0.1, 0.0), (0.9, 0.3, -0.1, 0.0))
-
-
-@compiled_only
-def test_two_who_pass_each_other_keep_their_numbers() -> None:
-    frames = 18 if COMPILED else 8
-    rows = rows_of(follow(BeliefTracker(RIG, QUICK, 0), frames, PASSING))
-    assert len(rows) == 2 * frames
-    for who, (x, y, dx, _) in enumerate(PASSING, start=1):
-        own = rows[rows["id"] == who]
-        away = np.hypot(own["x"] - (x + dx * own["frame"]), own["y"] - y)
-        assert away.max() < 0.25 and np.median(away) < 0.12
-
-
-@compiled_only
-def test_the_colours_lead_where_nobody_is_found() -> None:
-    """The pass finds a person in three frames and then no more: they are followed, and then ended with a reason."""
-    tracker = BeliefTracker(RIG, replace(CONFIG, belief=replace(FEW, patience=0.5)), 0)
-    commits = follow(tracker, 9, ((-0.5, 0.2, 0.08, 0.0),), found_until=3)
-    rows, events = rows_of(commits), np.concatenate([commit.events for commit in commits])
-    assert rows["frame"].tolist() == list(range(6))
-    assert np.hypot(rows["x"] - (-0.5 + 0.08 * rows["frame"]), rows["y"] - 0.2).max() < 0.25
-    assert [(e["kind"], e["id"]) for e in events] == [(b"birth", 1), (b"death", 1)]
-    assert events["reason"][1] == b"nobody was found there for 4 frames; its colours were seen"
-    assert not tracker.targets
 
 
 def test_the_order_of_targets_does_not_matter() -> None:
@@ -267,13 +228,29 @@ def test_the_order_of_targets_does_not_matter() -> None:
 
 
 @compiled_only
-def test_a_tracker_goes_on_after_it_was_put_aside() -> None:
+def test_two_who_pass_keep_numbers_also_after_a_break() -> None:
     tracker = BeliefTracker(RIG, QUICK, 0)
     assert follow(tracker, 3, PASSING)
     stored = pickle.loads(pickle.dumps(tracker))
     standing = people((-0.6, -0.3), (0.6, 0.3))
     one, other = (t.add(frame_of(3, standing), observations_of(standing))[0] for t in (tracker, stored))
     np.testing.assert_array_equal(one.trajectory, other.trajectory)
+    frames = 18 if COMPILED else 8
+    rows = rows_of(follow(BeliefTracker(RIG, QUICK, 0), frames, PASSING))
+    assert len(rows) == 2 * frames
+    for who, (x, y, dx, _) in enumerate(PASSING, start=1):
+        own = rows[rows["id"] == who]
+        away = np.hypot(own["x"] - (x + dx * own["frame"]), own["y"] - y)
+        assert away.max() < 0.25 and np.median(away) < 0.12
+    # The pass finds a person in three frames and then no more: they are followed, and then ended with a reason.
+    tracker = BeliefTracker(RIG, replace(CONFIG, belief=replace(FEW, patience=0.5)), 0)
+    commits = follow(tracker, 9, ((-0.5, 0.2, 0.08, 0.0),), found_until=3)
+    rows, events = rows_of(commits), np.concatenate([commit.events for commit in commits])
+    assert rows["frame"].tolist() == list(range(6))
+    assert np.hypot(rows["x"] - (-0.5 + 0.08 * rows["frame"]), rows["y"] - 0.2).max() < 0.25
+    assert [(e["kind"], e["id"]) for e in events] == [(b"birth", 1), (b"death", 1)]
+    assert events["reason"][1] == b"nobody was found there for 4 frames; its colours were seen"
+    assert not tracker.targets
 
 
 def test_whom_it_expects() -> None:

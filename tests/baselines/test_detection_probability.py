@@ -134,7 +134,7 @@ def test_a_pillar_stands_where_the_homographies_say(camera: Camera) -> None:
         assert pillars.edge[0, k] == pytest.approx(axis[along] + 0.5, abs=1e-2 + 1e-5 * abs(axis[along]))
 
 
-def test_a_map_all_foreground_fills_every_pillar_that_it_holds() -> None:
+def test_a_full_map_fills_every_pillar_and_unfit_ones_none() -> None:
     asked = probability()
     full = [np.ones(camera.size[::-1], np.float32) for camera in asked.rig.cameras]
     chance = asked.chance(asked.pillars[0], full[0])
@@ -143,9 +143,11 @@ def test_a_map_all_foreground_fills_every_pillar_that_it_holds() -> None:
     assert np.nanmin(chance) >= asked.config.unseen_rate - 1e-9
     expected = 4 * np.log(1 / asked.config.covered_share)
     np.testing.assert_allclose(asked.log_ratio(full).reshape(-1)[centre], expected, atol=1e-5)
+    refused(SourceError, "4, one a camera", asked.log_ratio, [None] * 3)
+    refused(SourceError, "corner1", asked.log_ratio, [None, np.zeros((3, 3), np.float32), None, None])
 
 
-def test_blind_views_and_invisible_pillars_say_nothing() -> None:
+def test_blind_views_hidden_pillars_and_outside_say_nothing() -> None:
     narrow = looking("narrow", (3.5, 3.5, 2.6), target=(-1.5, -1.5, 0.9), focal=260.0)
     views = (*corner_cameras()[:2], narrow)
     asked = probability(views)
@@ -156,9 +158,15 @@ def test_blind_views_and_invisible_pillars_say_nothing() -> None:
     np.testing.assert_array_equal(two[unseen], three[unseen])
     assert (two[~unseen] != three[~unseen]).any()
     np.testing.assert_array_equal(asked.log_ratio([None] * 3), 0.0)
+    rig = rig_of(corner_cameras())
+    triangle = np.array([[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0]])
+    asked = DetectionProbability(replace(rig, grid=replace(rig.grid, polygon=triangle)), FEW, BodyConfig())
+    said = asked.log_ratio([np.ones(camera.size[::-1], np.float32) for camera in rig.cameras])
+    beyond = asked.ground.sum(-1) > 0.1
+    assert np.isneginf(said[beyond]).all() and np.isfinite(said[~beyond & (asked.ground.sum(-1) < -0.1)]).all()
 
 
-def test_no_view_has_a_veto_alone() -> None:
+def test_no_view_has_a_veto_and_coarser_maps_say_the_same() -> None:
     views = corner_cameras()
     maps = list(likelihoods(views, people((0.25, -0.25))))
     maps[0][:] = 0.0
@@ -167,15 +175,14 @@ def test_no_view_has_a_veto_alone() -> None:
     assert np.hypot(*(asked.ground[place] - [0.25, -0.25])) < 0.3
     least = np.log(FEW.view_miss_rate / FEW.covered_share)
     assert (asked.log_ratio([np.zeros_like(m) for m in maps]) >= 4 * least - 1e-9).all()
-
-
-def test_outside_the_polygon_nobody_is() -> None:
-    rig = rig_of(corner_cameras())
-    triangle = np.array([[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0]])
-    asked = DetectionProbability(replace(rig, grid=replace(rig.grid, polygon=triangle)), FEW, BodyConfig())
-    said = asked.log_ratio([np.ones(camera.size[::-1], np.float32) for camera in rig.cameras])
-    beyond = asked.ground.sum(-1) > 0.1
-    assert np.isneginf(said[beyond]).all() and np.isfinite(said[~beyond & (asked.ground.sum(-1) < -0.1)]).all()
+    maps = list(likelihoods(views, people((0.4, -0.3), (-0.9, 0.8))))
+    coarse = [m.reshape(m.shape[0] // 2, 2, m.shape[1] // 2, 2).mean((1, 3)) for m in maps]
+    rig = rig_of(views)
+    fine, half = DetectionProbability(rig, FEW, BodyConfig()), DetectionProbability(rig, FEW, BodyConfig(), [2] * 4)
+    for k in range(4):
+        one, other = fine.chance(fine.pillars[k], maps[k]), half.chance(half.pillars[k], coarse[k])
+        seen = ~np.isnan(one) & ~np.isnan(other)
+        assert np.abs(one - other)[seen].mean() < 0.04
 
 
 @pytest.mark.parametrize("camera", (0, 1, 2))
@@ -192,24 +199,6 @@ def test_it_is_highest_at_people_through_a_lens_and_a_roll(camera: int) -> None:
     found = modes(weight, asked.ground, asked.spacing, 0.4)
     assert len(found) == 1 and np.hypot(*(found.ground[0] - standing[0, :2])) < 0.1
     assert np.sqrt(np.linalg.eigvalsh(found.covariance[0])).max() < 0.3
-
-
-def test_coarser_maps_say_nearly_the_same() -> None:
-    views = corner_cameras()
-    maps = list(likelihoods(views, people((0.4, -0.3), (-0.9, 0.8))))
-    coarse = [m.reshape(m.shape[0] // 2, 2, m.shape[1] // 2, 2).mean((1, 3)) for m in maps]
-    rig = rig_of(views)
-    fine, half = DetectionProbability(rig, FEW, BodyConfig()), DetectionProbability(rig, FEW, BodyConfig(), [2] * 4)
-    for k in range(4):
-        one, other = fine.chance(fine.pillars[k], maps[k]), half.chance(half.pillars[k], coarse[k])
-        seen = ~np.isnan(one) & ~np.isnan(other)
-        assert np.abs(one - other)[seen].mean() < 0.04
-
-
-def test_maps_that_do_not_fit_are_refused() -> None:
-    asked = probability()
-    refused(SourceError, "4, one a camera", asked.log_ratio, [None] * 3)
-    refused(SourceError, "corner1", asked.log_ratio, [None, np.zeros((3, 3), np.float32), None, None])
 
 
 @st.composite

@@ -74,7 +74,7 @@ def test_innovation_is_twice_the_negative_log_likelihood() -> None:
         assert cost[k, 0] == pytest.approx(squares[k, 0] + np.log(np.linalg.det(spread)))
 
 
-def test_two_who_cross_keep_their_names() -> None:
+def test_two_who_cross_or_turn_back_keep_their_names() -> None:
     """Where they meet, places alone do not tell them apart, but the ways that they come do."""
     step = 1.2 / FRAME_RATE
     frames = [[(-1.5 + step * k, 0.1), (1.5 - step * k, -0.1)] for k in range(20)]
@@ -82,45 +82,7 @@ def test_two_who_cross_keep_their_names() -> None:
     assert [(bytes(e["kind"]), int(e["id"])) for e in events] == [(b"birth", 1), (b"birth", 2)]
     assert np.ptp(rows["raw_y"][rows["id"] == 1]) == 0.0
     assert rows["raw_x"][rows["id"] == 1].tolist() == [x for (x, _), _ in frames]
-
-
-def test_a_place_beyond_the_gate_is_somebody_new() -> None:
-    rows, events = follow([[(0.0, 0.0)]] * 8 + [[(1.2, 0.0)]])
-    assert rows["id"].tolist() == [1] * 8 + [2]
-    wide = replace(CONFIG, kalman=KalmanConfig(gate_probability=1 - 1e-12))
-    rows, events = follow([[(0.0, 0.0)]] * 8 + [[(0.8, 0.0)]], wide)
-    assert rows["id"].tolist() == [1] * 9
-    assert len(events) == 1
-
-
-def test_who_is_not_found_for_too_long_is_forgotten() -> None:
-    patience = round(CONFIG.kalman.patience * FRAME_RATE)
-    for gap, ids in ((patience - 1, [1]), (patience, [1, 2])):
-        rows, events = follow([[(0.0, 0.0)]] * 8 + [[]] * gap + [[(0.0, 0.0)]] * 3)
-        assert np.unique(rows["id"]).tolist() == ids
-        deaths = events[events["kind"] == b"death"]
-        assert deaths["reason"].tolist() == [b"not found for 1 s"] * (len(ids) - 1)
-
-
-def test_rows_hold_filtered_and_detected_places() -> None:
-    jitter = [0.0, 0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1]
-    rows, _ = follow([[(0.0, y)] for y in jitter])
-    assert rows["raw_y"].tolist() == jitter and np.abs(rows["y"][4:]).max() < 0.08
-    assert (rows["xx"][1:] < rows["xx"][0]).all()
-
-
-def test_identities_stand_short_tracks_go_and_gaps_are_filled() -> None:
-    places = [[(-1.0, 0.0)]] * 8 + [[]] * 2 + [[(-1.0, 0.0)]] * 8
-    places[3] = [(-1.0, 0.0), (1.5, 1.5)]
-    rows, events = follow(places)
-    whole = committed_tracks(rows, events, FRAME_RATE, CONFIG.tracking)
-    assert whole.trajectory["id"].tolist() == [1] * 18
-    assert whole.trajectory["frame"].tolist() == list(range(18))
-    assert sorted(set(whole.identity.tolist())) == [0, 1] and b"dropped" in whole.events["kind"].tolist()
-
-
-def test_heights_tell_apart_two_who_turn_back_where_they_meet() -> None:
-    """By their ways alone they would have passed each other."""
+    # By their ways alone they would have passed each other.
     step, turned = 1.2 / FRAME_RATE, 10
     short, tall = 1.62, 1.86
     tracker, names = KalmanTracker(RIG, CONFIG, 0), []
@@ -132,3 +94,32 @@ def test_heights_tell_apart_two_who_turn_back_where_they_meet() -> None:
         rows = commit.trajectory[np.argsort(commit.trajectory["raw_x"])]
         names.append(rows["id"].tolist())
     assert names == [names[0]] * len(names)
+
+
+def test_places_beyond_the_gate_or_too_late_are_somebody_new() -> None:
+    rows, events = follow([[(0.0, 0.0)]] * 8 + [[(1.2, 0.0)]])
+    assert rows["id"].tolist() == [1] * 8 + [2]
+    wide = replace(CONFIG, kalman=KalmanConfig(gate_probability=1 - 1e-12))
+    rows, events = follow([[(0.0, 0.0)]] * 8 + [[(0.8, 0.0)]], wide)
+    assert rows["id"].tolist() == [1] * 9
+    assert len(events) == 1
+    patience = round(CONFIG.kalman.patience * FRAME_RATE)
+    for gap, ids in ((patience - 1, [1]), (patience, [1, 2])):
+        rows, events = follow([[(0.0, 0.0)]] * 8 + [[]] * gap + [[(0.0, 0.0)]] * 3)
+        assert np.unique(rows["id"]).tolist() == ids
+        deaths = events[events["kind"] == b"death"]
+        assert deaths["reason"].tolist() == [b"not found for 1 s"] * (len(ids) - 1)
+
+
+def test_rows_hold_places_of_long_tracks_without_gaps() -> None:
+    jitter = [0.0, 0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1]
+    rows, _ = follow([[(0.0, y)] for y in jitter])
+    assert rows["raw_y"].tolist() == jitter and np.abs(rows["y"][4:]).max() < 0.08
+    assert (rows["xx"][1:] < rows["xx"][0]).all()
+    places = [[(-1.0, 0.0)]] * 8 + [[]] * 2 + [[(-1.0, 0.0)]] * 8
+    places[3] = [(-1.0, 0.0), (1.5, 1.5)]
+    rows, events = follow(places)
+    whole = committed_tracks(rows, events, FRAME_RATE, CONFIG.tracking)
+    assert whole.trajectory["id"].tolist() == [1] * 18
+    assert whole.trajectory["frame"].tolist() == list(range(18))
+    assert sorted(set(whole.identity.tolist())) == [0, 1] and b"dropped" in whole.events["kind"].tolist()

@@ -50,11 +50,15 @@ GROUPS = st.integers(0, 2**32 - 1).map(
 """Three people anywhere in the room."""
 
 
-def test_normalised_colours_forget_the_light() -> None:
+def test_colours_forget_the_light_and_share_out_samples() -> None:
     dark, bright = np.array([[[20, 40, 60]]], np.uint8), np.array([[[60, 120, 180]]], np.uint8)
     a, b = normalised(dark)[0, 0].astype(int), normalised(bright)[0, 0].astype(int)
     assert (a[:2] == b[:2]).all() and (a[2], b[2]) == (40, 120)
     assert normalised(np.zeros((1, 1, 3), np.uint8)).tolist() == [[[0, 0, 0]]]
+    colour = np.array([[0, 0, 0], [0, 0, 0], [255, 255, 255]], np.uint8)
+    shares = histogram(colour)
+    assert shares.sum() == pytest.approx(1) and shares[0] == pytest.approx(2 / 3)
+    assert bins_of(colour).tolist() == [0, 0, int(np.prod(BINS)) - 1] and histogram(colour[:0]).sum() == 0
 
 
 @drawn(20, st.integers(0, 2**32 - 1))
@@ -69,13 +73,6 @@ def test_density_is_equation_1(seed: int) -> None:
         asked = wanted[v, u] and u >= 1
         assert density[0, v, u] == pytest.approx(plain.density(colour[v, u], samples[0, :7]) if asked else -1, rel=1e-4)
         assert density[1, v, u] == (1 if asked else -1)
-
-
-def test_histograms_share_out_their_samples() -> None:
-    colour = np.array([[0, 0, 0], [0, 0, 0], [255, 255, 255]], np.uint8)
-    shares = histogram(colour)
-    assert shares.sum() == pytest.approx(1) and shares[0] == pytest.approx(2 / 3)
-    assert bins_of(colour).tolist() == [0, 0, int(np.prod(BINS)) - 1] and histogram(colour[:0]).sum() == 0
 
 
 @drawn(5, GROUPS)
@@ -99,7 +96,7 @@ def test_segmentation_is_equations_2_to_4(standing: Floats) -> None:
     assert (canvas.label[foreground == 0] == NO_PERSON).all()
 
 
-def test_boxes_hold_all_that_a_body_may_cover() -> None:
+def test_boxes_hold_bodies_and_what_is_open_is_in_front() -> None:
     standing, ideal = people((0.3, -0.4), (-1.2, 1.1)), raster(CAMERA, 2)
     bodies, boxes = bodies_of(CAMERA, standing), np.zeros((2, 4), np.int64)
     fill_boxes(ideal, bodies, np.array([0.0, 0.4]), boxes)
@@ -111,10 +108,7 @@ def test_boxes_hold_all_that_a_body_may_cover() -> None:
     far = bodies_of(CAMERA, people((-30.0, -30.0)))
     fill_boxes(ideal, far, np.zeros(1), boxes[:1])
     assert (boxes[0, 1::2] <= boxes[0, ::2]).all()  # behind the camera
-
-
-def test_what_is_open_is_in_front() -> None:
-    """Two in line with the camera: of the one behind, no pixel that the other covers is open."""
+    # Two in line with the camera: of the one behind, no pixel that the other covers is open.
     way = -CAMERA.centre[:2] / np.linalg.norm(CAMERA.centre[:2])
     standing = people(tuple(way * -0.4), tuple(way * 0.4))
     ideal = raster(CAMERA, 2)
@@ -184,7 +178,7 @@ def test_misfit_is_equations_6_and_7(standing: Floats) -> None:
     np.testing.assert_allclose(misfit, expected, atol=1e-6)
 
 
-def test_particles_are_drawn_by_their_weights() -> None:
+def test_particles_are_drawn_and_appearances_are_renewed() -> None:
     rng = np.random.default_rng(2)
     particles = np.arange(8.0).reshape(4, 1, 2)
     weight = particle_weights(np.array([0.0, 0.0, 50.0, 1.0]), 2.0)
@@ -195,9 +189,6 @@ def test_particles_are_drawn_by_their_weights() -> None:
     mean, covariance = estimate(particles, weight)
     assert mean[0, 0] == pytest.approx(particles[:, 0, 0] @ weight)
     assert covariance[0, 0, 0] == pytest.approx((particles[:, 0, 0] - mean[0, 0]) ** 2 @ weight)
-
-
-def test_appearances_fill_and_are_renewed_slowly() -> None:
     rng = np.random.default_rng(0)
     red, blue = np.full((300, 3), (200, 10, 90), np.uint8), np.full((300, 3), (10, 10, 90), np.uint8)
     one = PersonAppearance.unknown().learned(1, red[:10], 0.1, rng)
@@ -225,13 +216,18 @@ FRAMES = 16 if COMPILED else 6
 
 
 @compiled_only
-def test_people_are_followed_by_their_colours() -> None:
+def test_people_are_followed_by_their_colours_until_they_go() -> None:
     rows = passing(QUICK, FRAMES)
     assert np.unique(rows["id"]).tolist() == [1, 2] and len(rows) == 2 * FRAMES
     x = np.where(rows["id"] == 1, -1.2 + 0.1 * rows["frame"], 1.2 - 0.1 * rows["frame"])
     off = np.hypot(rows["x"] - x, rows["y"] - np.where(rows["id"] == 1, -0.3, 0.3))
     assert off.mean() < 0.1 and off.max() < 0.35
     assert (rows["xx"] > 0).all()
+    config = replace(QUICK, particles=replace(QUICK.particles, patience=0.5))
+    tracker = ParticleTracker(RIG, config, 0)
+    commits = follow(tracker, 7, [(0.0, 0.0, 0.0, 0.0)], found_until=2)
+    events = np.concatenate([commit.events for commit in commits])[["frame", "kind", "reason"]].tolist()
+    assert events == [(0, b"birth", b"found where nobody was followed"), (6, b"death", b"not found for 0.5 s")]
 
 
 def test_the_search_goes_to_the_person_from_beside() -> None:
@@ -258,15 +254,6 @@ def test_the_search_goes_to_the_person_from_beside() -> None:
     assert right[0] < wrong[0]
 
 
-@compiled_only
-def test_who_is_not_found_or_leaves_is_followed_no_longer() -> None:
-    config = replace(QUICK, particles=replace(QUICK.particles, patience=0.5))
-    tracker = ParticleTracker(RIG, config, 0)
-    commits = follow(tracker, 7, [(0.0, 0.0, 0.0, 0.0)], found_until=2)
-    events = np.concatenate([commit.events for commit in commits])[["frame", "kind", "reason"]].tolist()
-    assert events == [(0, b"birth", b"found where nobody was followed"), (6, b"death", b"not found for 0.5 s")]
-
-
 def test_who_was_lost_is_known_again_where_somebody_is_found() -> None:
     """The particles are a metre off; the pass finds somebody in the old clothes where nobody is followed."""
     standing, tracker = people((-0.5, 0.2)), ParticleTracker(RIG, QUICK, 0)
@@ -279,7 +266,7 @@ def test_who_was_lost_is_known_again_where_somebody_is_found() -> None:
     assert len(commit.events) == 0
 
 
-def test_one_camera_in_colour_is_enough() -> None:
+def test_one_colour_camera_or_a_lens_is_enough() -> None:
     standing = people((0.0, 0.0))
     full = observations_of(standing)
     tracker = ParticleTracker(RIG, QUICK, 0)
@@ -291,10 +278,7 @@ def test_one_camera_in_colour_is_enough() -> None:
     rows = rows_of([*tracker.add(frame_of(0, standing), alone), *tracker.add(frame_of(1, standing), blind)])
     assert rows["id"].tolist() == [1, 1]
     assert [view is not None for view in colour_views(alone, "particles", 0)] == [True, False, False, False]
-
-
-def test_a_lens_bends_the_raster_not_the_people() -> None:
-    """The same person through a barrel lens: the axis still passes through their place."""
+    # The same person through a barrel lens: the axis still passes through their place.
     camera = looking("barrel", (-3.5, -3.5, 2.6), distortion=(-0.2, 0.03, 0.0, 0.0, 0.0))
     view, standing = ParticleView(camera, SIZE[0]), people((0.6, 0.4))
     silhouette = (mask(camera, standing) / np.float32(255)).astype(np.float32)

@@ -54,8 +54,15 @@ def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
     assert (apart[np.triu_indices(len(found), 1)] >= scenes.FEW_HEIGHTS.lattice_spacing).all()
 
 
-def test_the_lattice_alone_proposes_nothing() -> None:
+def test_lattices_sources_and_volumes_propose_no_duplicates() -> None:
     assert find_candidate_source(RIG, ["pixels"] * 4, scenes.CONFIG) is None
+    seen = evidence("pixels")
+    volume, both = (candidates("pixels", asked).of(seen, fuse("pixels")) for asked in ("volume", "both"))
+    np.testing.assert_array_equal(both.ground[: len(volume)], volume.ground)
+    occupancy = Occupancy(RIG, ["pixels"] * 4, scenes.CONFIG.occupancy, scenes.FEW_HEIGHTS, scenes.BODY)
+    filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)).dense())
+    away = np.hypot(*np.moveaxis(RIG.grid.ground[:, :, None] - STANDING[:, :2], -1, 0)).min(-1)
+    assert filled[away < 0.12].min() > 0.5 and filled[away > 0.8].max() < 0.1
 
 
 @pytest.mark.parametrize(
@@ -65,21 +72,7 @@ def test_where_nothing_is_seen_nobody_is_proposed(seen: Sequence[ViewEvidence]) 
     assert len(candidates("boxes", "both").of(list(seen), fuse("boxes"))) == 0
 
 
-def test_both_sources_have_no_duplicates_of_each_other() -> None:
-    seen = evidence("pixels")
-    volume, both = (candidates("pixels", asked).of(seen, fuse("pixels")) for asked in ("volume", "both"))
-    np.testing.assert_array_equal(both.ground[: len(volume)], volume.ground)
-
-
-def test_the_volume_without_explanation_is_filled_at_people() -> None:
-    occupancy = Occupancy(RIG, ["pixels"] * 4, scenes.CONFIG.occupancy, scenes.FEW_HEIGHTS, scenes.BODY)
-    seen = evidence("pixels")
-    filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)).dense())
-    away = np.hypot(*np.moveaxis(RIG.grid.ground[:, :, None] - STANDING[:, :2], -1, 0)).min(-1)
-    assert filled[away < 0.12].min() > 0.5 and filled[away > 0.8].max() < 0.1
-
-
-def test_duplicates_are_dropped_in_order() -> None:
+def test_duplicates_are_dropped_in_order_expected_ones_first() -> None:
     known, other = pool((0.0, 0.0), (1.0, 0.0)), pool((0.1, 0.0), (0.5, 0.5), (0.55, 0.5), (1.0, 0.3))
     merged = known.joined_if_distant(other, 0.25)
     np.testing.assert_array_equal(merged.ground, [[0.0, 0.0], [1.0, 0.0], [0.5, 0.5], [1.0, 0.3]])
@@ -88,6 +81,11 @@ def test_duplicates_are_dropped_in_order() -> None:
     taller = Candidates(known.ground, known.height + np.array([0.0, 0.1]), known.width)
     np.testing.assert_array_equal(taller.new_to(known).ground, [[1.0, 0.0]])
     assert len(known.new_to(known)) == 0 and len(known.new_to(pool())) == 2
+    frame_pass = scenes.detector_of(RIG, "pixels")
+    expected = scenes.expecting(*STANDING.tolist())
+    proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
+    found = frame_pass.explain(evidence("pixels"), expected, proposed).people
+    assert sorted(found.track_index) == [0, 1, 2]
 
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
@@ -98,14 +96,6 @@ def test_detection_keeps_people_of_proposals_and_drops_others(kind: str) -> None
     assert len(plain) == len(given) == len(STANDING)
     away = np.hypot(*np.moveaxis(given.ground[:, None] - STANDING[:, :2], -1, 0))
     assert away.min(1).max() < 0.15
-
-
-def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
-    frame_pass = scenes.detector_of(RIG, "pixels")
-    expected = scenes.expecting(*STANDING.tolist())
-    proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
-    found = frame_pass.explain(evidence("pixels"), expected, proposed).people
-    assert sorted(found.track_index) == [0, 1, 2]
 
 
 @pytest.mark.parametrize("asked", ["both", *in_ci("probability", "volume")])

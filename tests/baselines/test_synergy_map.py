@@ -48,15 +48,6 @@ def test_means_over_footprints_by_definition(width: int, height: int, seed: int)
         assert level / TOP_LEVEL == pytest.approx(mean, abs=1.01 / TOP_LEVEL)
 
 
-def test_sums_may_pass_the_end_of_their_numbers() -> None:
-    levels = np.random.default_rng(0).integers(0, TOP_LEVEL + 1, (8, 9))
-    whole = np.pad(levels.cumsum(0).cumsum(1), ((1, 0), (1, 0))) + 2**32 - 40_000
-    sums = (whole % 2**32).astype(np.uint32)
-    assert (np.diff(sums.astype(float), axis=1) < 0).any()
-    with np.errstate(over="ignore"):
-        assert sum_of(sums, 2, 1, 9, 7) == levels[1:7, 2:9].sum()
-
-
 @pytest.mark.parametrize("value", [-0.5, 1.5, np.nan])
 def test_what_is_no_likelihood_becomes_one(value: float) -> None:
     maps = [np.full((96, 128), value, np.float32)] * 4
@@ -108,23 +99,43 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     np.testing.assert_array_equal(explained.fuse([*maps], explanation).dense(), plain)
 
 
-def test_terms_at_their_ends() -> None:
+def test_terms_and_sums_at_the_end_of_their_numbers() -> None:
     terms = log_odds_terms(ErrorRates(0.2, 0.07, 0.4))
     np.testing.assert_allclose(terms[:, 0], np.log([0.2 / 0.93, 0.2 / 0.6]), rtol=1e-5)
     np.testing.assert_allclose(terms[:, TOP_LEVEL], np.log([0.8 / 0.07, 0.8 / 0.4]), rtol=1e-5)
     assert (np.diff(terms) > 0).all()
     np.testing.assert_allclose(synergy_terms(0.05)[:, 0], np.log(0.05), rtol=1e-5)
     assert (synergy_terms(0.05)[:, TOP_LEVEL] == 0).all()
+    levels = np.random.default_rng(0).integers(0, TOP_LEVEL + 1, (8, 9))
+    whole = np.pad(levels.cumsum(0).cumsum(1), ((1, 0), (1, 0))) + 2**32 - 40_000
+    sums = (whole % 2**32).astype(np.uint32)
+    assert (np.diff(sums.astype(float), axis=1) < 0).any()
+    with np.errstate(over="ignore"):
+        assert sum_of(sums, 2, 1, 9, 7) == levels[1:7, 2:9].sum()
 
 
-def test_maps_that_do_not_fit_the_cameras() -> None:
+def test_maps_that_do_not_fit_and_planes_by_default() -> None:
     localiser = Localiser(COARSE, "point")
     refused(SourceError, "found 3, expected 4", localiser.synergy, noise(0, 3), np.ones(3), 0.05)
     with pytest.raises(SourceError, match="corner1"):
         localiser.synergy([noise(0)[0], np.zeros((9, 9), np.float32), None, None], np.ones(4), 0.05)
+    assert Grid((0, 1), (0, 1)).planes == 10
+    for planes in (1, 3, 25):
+        rig = rig_of(corner_cameras()[:1], cell=1.0, planes=planes)
+        assert Localiser(rig).synergy(noise(1, 1), np.ones(1), 0.05).shape == (planes, 4, 4)
 
 
-def test_near_views_do_not_alias() -> None:
+def test_people_are_where_the_volume_is_highest() -> None:
+    standing = people((0.3, -0.4))
+    rig = rig_of(corner_cameras(), cell=0.1, planes=5)
+    localiser = Localiser(rig)
+    maps = list(likelihoods(rig.cameras, standing))
+    volume = localiser.log_odds(maps, localiser.clutter_weights(maps), [RATES] * 4, OCCUPIED)
+    peak = rig.grid.ground.reshape(-1, 2)[np.nan_to_num(volume[:4], nan=-99).mean(0).argmax()]
+    assert np.hypot(*(peak - standing[0, :2])) < 0.15
+
+
+def test_near_views_do_not_alias_and_far_ones_do_not_blur() -> None:
     """Stripes finer than a cell are half foreground to a footprint, and all or nothing to a point."""
     camera = looking("near", (-1.0, -1.0, 2.0), size=(640, 480), focal=420.0)
     rig = rig_of([camera], cell=0.25, planes=1)
@@ -132,10 +143,7 @@ def test_near_views_do_not_alias() -> None:
     stripes[:, ::2] = 1.0
     spread = {kind: np.nanstd(Localiser(rig, kind).log_odds([stripes], np.ones(1), [RATES], 0.5)) for kind in KINDS}
     assert spread["footprint"] < 0.2 * spread["point"]
-
-
-def test_far_views_do_not_blur() -> None:
-    """A cell smaller than a pixel is the pixel that shows it."""
+    # A cell smaller than a pixel is the pixel that shows it.
     rig = rig_of([looking("far", (-30.0, -30.0, 9.0), focal=75.0)], cell=0.25)
     maps = noise(7, 1)
     point, footprint = (Localiser(rig, kind).synergy(maps, np.ones(1), 0.05) for kind in KINDS)
@@ -175,13 +183,6 @@ def test_a_wall_is_as_good_a_reference_plane_as_the_ground() -> None:
     assert (meant[beside] < 0).all()
 
 
-def test_ten_planes_unless_somebody_says_otherwise() -> None:
-    assert Grid((0, 1), (0, 1)).planes == 10
-    for planes in (1, 3, 25):
-        rig = rig_of(corner_cameras()[:1], cell=1.0, planes=planes)
-        assert Localiser(rig).synergy(noise(1, 1), np.ones(1), 0.05).shape == (planes, 4, 4)
-
-
 def fine_views(views: int) -> Localiser:
     """So many cameras in one place, above fine cells of one plane."""
     cameras = [looking(f"cam{k}", (0.0, -3.5, 2.6), focal=60.0) for k in range(views)]
@@ -216,13 +217,3 @@ def test_cells_of_few_views_fill_under_a_mean_alone() -> None:
         false_u[views] = np.mean(localiser.log_odds(empty, equal, [RATES] * views, OCCUPIED) > 0)
     assert false_mean[2] > 4 * false_mean[4] > 4 * false_mean[8]
     assert max(false_u.values()) < 0.02
-
-
-def test_people_are_where_the_volume_is_highest() -> None:
-    standing = people((0.3, -0.4))
-    rig = rig_of(corner_cameras(), cell=0.1, planes=5)
-    localiser = Localiser(rig)
-    maps = list(likelihoods(rig.cameras, standing))
-    volume = localiser.log_odds(maps, localiser.clutter_weights(maps), [RATES] * 4, OCCUPIED)
-    peak = rig.grid.ground.reshape(-1, 2)[np.nan_to_num(volume[:4], nan=-99).mean(0).argmax()]
-    assert np.hypot(*(peak - standing[0, :2])) < 0.15

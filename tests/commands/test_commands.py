@@ -28,7 +28,7 @@ from stseg.geometry.lens import LensModel
 from stseg.tasks.overview import summarise_run
 
 
-def test_help_names_every_command_and_imports_none() -> None:
+def test_version_and_help_name_every_command_and_import_none(stdout: Command) -> None:
     program = (
         "import sys; from stseg.commands.main import main; main(['--help']);"
         "print(*(name for name in ('numba', 'cv2', 'h5py', 'scipy') if name in sys.modules), file=sys.stderr)"
@@ -36,6 +36,8 @@ def test_help_names_every_command_and_imports_none() -> None:
     found = process(program)
     assert (found.returncode, found.stderr.strip()) == (0, "")
     assert all(f" {command} " in found.stdout for command in COMMANDS)
+    assert stdout("--version") == f"{stseg.__version__}\n"
+    assert "MOTChallenge" in stdout("export", "--help")  # the long text, not the line of the list
 
 
 def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
@@ -63,11 +65,6 @@ def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert capsys.readouterr().err.startswith("stseg: interrupted; the same command goes on after the last finished")
 
 
-def test_version_and_help_of_a_command(stdout: Command) -> None:
-    assert stdout("--version") == f"{stseg.__version__}\n"
-    assert "MOTChallenge" in stdout("export", "--help")  # the long text, not the line of the list
-
-
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_knows_commands_and_options(shell: str, stdout: Command) -> None:
     text = stdout("completion", shell)
@@ -84,7 +81,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(run_path: Path) -> None:
     assert running.returncode == 0
 
 
-def test_inspect_sums_up_a_run(run_path: Path) -> None:
+def test_inspect_sums_up_a_run_its_people_and_ghosts(run_path: Path) -> None:
     overview = summarise_run(read_run(run_path))
     assert (overview.frames, overview.first_frame, overview.last_frame, overview.seconds) == (6, 10, 15, 1.2)
     assert (overview.people_mean, overview.people_most) == (1.5, 2)
@@ -97,10 +94,6 @@ def test_inspect_sums_up_a_run(run_path: Path) -> None:
     assert overview.rates["left"] == pytest.approx({"miss": 0.2, "clutter": 0.025, "person_clutter": 0.4})
     assert overview.bytes == run_path.stat().st_size
     assert overview.warnings == ["view right has no evidence on any candidate: is it blind, or its calibration wrong?"]
-
-
-def test_inspect_counts_people_and_explains_ghosts(run_path: Path) -> None:
-    overview = summarise_run(read_run(run_path))
     assert overview.people_per_minute == [1.5]
     assert overview.track_seconds == pytest.approx({"shortest": 0.6, "median": 0.9, "longest": 1.2})
     assert overview.ground_by_views == [0, 0, 1]
@@ -108,22 +101,33 @@ def test_inspect_counts_people_and_explains_ghosts(run_path: Path) -> None:
     assert overview.ghosts_denied_by == {"left": 1, "right": 0}
 
 
-def test_the_json_is_as_documented(run_path: Path, stdout: Command) -> None:
+def test_inspect_as_json_and_on_a_screen_warns_of_empty_runs(run_path: Path, stdout: Command, tmp_path: Path) -> None:
     found = json.loads(stdout("inspect", run_path, "--json"))
     assert (found["cameras"], found["tracks"][0]["frames"]) == (["left", "right"], 6)
     page = (Path(__file__).parents[2] / "docs" / "outputs.md").read_text("utf-8")
     _, _, listed = page.partition("## Keys of `stseg inspect --json`")
     cells = re.findall(r"^\| (`.*?`) \|", listed, re.MULTILINE)
     assert re.findall(r"`(\w+)`", " ".join(cells)) == list(found)
+    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 merge"
+    screen = stdout("inspect", run_path)
+    for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
+        assert said in screen
+    assert re.search(r"left +20\.0 +2\.5 +40\.0 +1 *\n", screen)  # of each view, how it errs and what it denies
+    path = write_run(tmp_path / "silent.h5", small_recording(tmp_path), trajectory_of(), np.array([0]), views=0)
+    assert read_run(path).warnings == ["no person was found", "no view sees any cell"]
+    assert "warning: no person was found" in stdout("inspect", path)
 
 
-def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, stdout: Command) -> None:
+def test_inspect_writes_a_slice_to_a_file(run_path: Path, tmp_path: Path, stdout: Command, refusal: Command) -> None:
     texts = ("t=2.2,plane=0.9", "frame=11,plane=0.85", "t=2.4,plane=0.9", "t=2.2,plane=0", "frame=11,plane=all")
     said = [stdout("inspect", run_path, "--slice", text, "-o", tmp_path / f"{k}.png") for k, text in enumerate(texts)]
     pictures = [(tmp_path / f"{k}.png").read_bytes() for k in range(5)]
     assert pictures[0] == pictures[1] and len(set(pictures)) == 4
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
     assert "0.png: frame 11 (2.20 s), 0.90 m" in said[0]
+    command = ("inspect", run_path, "--slice", "t=2,plane=0")
+    assert "-o SLICE.png with it" in refusal(*command)
+    refusal("inspect", run_path, "-o", tmp_path / "a.png")
 
 
 @cases()
@@ -132,27 +136,7 @@ def test_slices_out_of_range(run_path: Path, tmp_path: Path, refusal: Command, a
     assert not (tmp_path / "slice.png").exists()
 
 
-def test_a_slice_needs_a_file(run_path: Path, tmp_path: Path, refusal: Command) -> None:
-    command = ("inspect", run_path, "--slice", "t=2,plane=0")
-    assert "-o SLICE.png with it" in refusal(*command)
-    refusal("inspect", run_path, "-o", tmp_path / "a.png")
-
-
-def test_inspect_on_a_screen(run_path: Path, stdout: Command) -> None:
-    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 merge"
-    screen = stdout("inspect", run_path)
-    for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
-        assert said in screen
-    assert re.search(r"left +20\.0 +2\.5 +40\.0 +1 *\n", screen)  # of each view, how it errs and what it denies
-
-
-def test_inspect_warns_of_an_empty_run(tmp_path: Path, stdout: Command) -> None:
-    path = write_run(tmp_path / "silent.h5", small_recording(tmp_path), trajectory_of(), np.array([0]), views=0)
-    assert read_run(path).warnings == ["no person was found", "no view sees any cell"]
-    assert "warning: no person was found" in stdout("inspect", path)
-
-
-def test_export_to_pedpy_and_mot(run_path: Path, tmp_path: Path) -> None:
+def test_export_and_evaluate_take_a_run_file(run_path: Path, tmp_path: Path, stdout: Command) -> None:
     assert main(["export", str(run_path), "--to", "pedpy", "-o", str(tmp_path / "tracks.txt")]) == 0
     lines = (tmp_path / "tracks.txt").read_text().splitlines()
     assert lines[:3] == ["# framerate: 5.00", "# id frame x/m y/m z/m", "1 10 0.1500 0.2000 0.0000"]
@@ -160,9 +144,6 @@ def test_export_to_pedpy_and_mot(run_path: Path, tmp_path: Path) -> None:
     assert main(["export", str(run_path), "--to", "mot", "-o", str(tmp_path / "mot.txt")]) == 0
     lines = (tmp_path / "mot.txt").read_text().splitlines()
     assert lines[0] == "11,1,-1,-1,-1,-1,1,0.1500,0.2000,0.0000" and len(lines) == len(small_trajectory())
-
-
-def test_evaluate_takes_a_run_file(run_path: Path, tmp_path: Path, stdout: Command) -> None:
     truth = tmp_path / "truth.csv"
     stdout("export", run_path, "--to", "csv", "-o", truth)
     assert json.loads(stdout("evaluate", run_path, truth, "--json"))["MODA"] == 100
@@ -192,25 +173,17 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
 
 
 @pytest.mark.slow
-def test_people_are_tracked(demo: Demo, stdout: Command) -> None:
+def test_people_are_tracked_scored_and_shown(demo: Demo, stdout: Command) -> None:
     truth = demo.folder / "scene" / "truth.csv"
     scores = json.loads(stdout("evaluate", demo.folder / "run.h5", truth, "--json"))
     assert all(scores[name] >= golden - 1.0 for name, golden in GOLDEN.items())
     run = read_run(demo.folder / "run.h5")
     assert set(run.frames) >= set(read_tracks_csv(truth)["frame"])
     assert all(source.source.kind == "video" and source.background for source in run.recording.sources)
-
-
-@pytest.mark.slow
-def test_pictures_and_page_are_there(demo: Demo) -> None:
     cameras = read_run(demo.folder / "run.h5").cameras
     for name in ("plan", "spacetime", "slices", "marginal", *(f"overlay_{camera}" for camera in cameras)):
         assert (demo.folder / "pictures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert (demo.folder / "report.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
-
-
-@pytest.mark.slow
-def test_it_scores_and_names_what_to_open(demo: Demo) -> None:
     assert re.search(r"MODA \d+\.\d %", demo.said)
     listed = re.findall(r"^  (\S+) ", demo.said.partition("\nOpen\n")[2], re.MULTILINE)
     assert str(demo.folder / "report.html") in listed and all(Path(name).is_file() for name in listed)

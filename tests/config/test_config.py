@@ -56,19 +56,17 @@ def wrapped(table: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def test_nothing_given_is_the_default() -> None:
+def test_nothing_given_is_the_default_and_texts_need_no_quotes() -> None:
     assert read_config(None) == Config()
+    assert build(Outer, {"kind": Given("boxes", "--set")}, "--set").kind == "boxes"
 
 
-def test_a_file_and_assignments_say_what_differs(tmp_path: Path) -> None:
+def test_files_and_assignments_differ_and_read_back_equal(tmp_path: Path) -> None:
     rounds = ("detection.search_rounds = 5", "detection.search_rounds=6")
     config = read(tmp_path / "c.toml", TOML, "detection.prior_log_odds=-1.5", *rounds)
     expected = replace(Config().detection, prior_log_odds=-1.5, search_rounds=6)
     assert config == replace(Config(), body=BodyConfig(heights=(1.5, 1.75)), detection=expected)
     assert isinstance(read(tmp_path / "c.toml", TOML).detection.prior_log_odds, float)
-
-
-def test_the_resolved_text_reads_back_equal(tmp_path: Path) -> None:
     config = read_config(None, ["detection.prior_log_odds=-1e-3", "body.heights=[1, 1.25]"])
     text = format_config(config)
     assert read(tmp_path / "c.toml", text) == config
@@ -112,10 +110,6 @@ def test_a_fault_is_laid_where_the_value_was_given(tmp_path: Path) -> None:
     refused(ConfigError, r"none\.toml: found No such file", read_config, tmp_path / "none.toml")
 
 
-def test_a_text_needs_no_quotes_in_an_assignment() -> None:
-    assert build(Outer, {"kind": Given("boxes", "--set")}, "--set").kind == "boxes"
-
-
 @pytest.mark.parametrize("wrong", [{"width_mean": 0.05}, {"heights": (1.8, 1.7)}, {"heights": ()}])
 def test_bodies_without_meaning_are_refused(wrong: dict[str, Any]) -> None:
     refused(ConfigError, next(iter(wrong)), BodyConfig, **wrong)
@@ -128,21 +122,18 @@ def test_a_printed_configuration_can_be_given_back(tmp_path: Path, expert: bool,
     assert read(tmp_path / "c.toml", describe_config(config, expert=expert)) == config
 
 
-def test_a_user_sees_few_keys_and_an_expert_all() -> None:
+def test_users_see_few_keys_experts_all_and_their_meaning() -> None:
     few, every = (tomllib.loads(describe_config(Config(), expert=expert)) for expert in (False, True))
     assert len(USER_KEYS) <= 30 and count(few) == len(USER_KEYS)
     assert count(every) == len(dict(values(Config())))
     chosen = tomllib.loads(describe_config(read_config(None, ["foreground.model=codebook"]), expert=False))
     assert set(chosen["foreground"]) == {"model", "body_rows", "codebook"}
+    for key, _ in values(Config()):
+        assert describe(key).endswith("."), key
 
 
 def count(table: dict[str, Any]) -> int:
     return sum(count(value) if isinstance(value, dict) else 1 for value in table.values())
-
-
-def test_every_key_has_a_meaning_of_one_sentence_or_more() -> None:
-    for key, _ in values(Config()):
-        assert describe(key).endswith("."), key
 
 
 @cases()

@@ -88,19 +88,22 @@ def afterwards(rig: Path, live: Path, tmp_path_factory: pytest.TempPathFactory) 
     return output
 
 
-def test_what_is_followed_ends_as_what_is_run_afterwards(live: Path, afterwards: Path) -> None:
+def test_what_is_followed_ends_as_a_run_and_keeps_its_lines(live: Path, afterwards: Path) -> None:
     assert_same(live, afterwards)
     scores = evaluate(walkers(FRAMES), read_run(live).trajectory)
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
     assert sorted(path.name for path in live.parent.iterdir()) == ["run.h5", "run.h5.live.csv"]
-
-
-def test_tracks_are_written_window_by_window_under_lasting_ids(live: Path) -> None:
     messages = read_tracks_csv(live.with_name("run.h5.live.csv"))
     assert np.unique(messages["frame"]).tolist() == list(range(FRAMES))
     assert (np.diff(messages["frame"]) >= 0).all()
     scores = evaluate(walkers(FRAMES), messages)
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
+    # By frame and place, so that final ids are found for what was written under provisional ones.
+    written, kept = read_tracks_csv(live.with_name("run.h5.live.csv")), read_run(live).committed
+    assert len(written) == len(kept) > 0
+    written, kept = (rows[np.lexsort((rows["x"], rows["frame"]))] for rows in (written, kept))
+    for name in ("frame", "x", "y"):
+        np.testing.assert_allclose(written[name], kept[name], atol=6e-4, rtol=0)
 
 
 def test_corrected_ids_are_written(rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,15 +129,6 @@ def test_corrected_ids_are_written(rig: Path, live: Path, tmp_path: Path, monkey
     late = corrected_ids(messages, corrections)
     assert evaluate(walkers(FRAMES), late[late["frame"] >= 4]).switches == 0
     assert_same(output, live)
-
-
-def test_the_run_file_keeps_every_line_of_the_live_table(live: Path) -> None:
-    """By frame and place, so that final ids are found for what was written under provisional ones."""
-    written, kept = read_tracks_csv(live.with_name("run.h5.live.csv")), read_run(live).committed
-    assert len(written) == len(kept) > 0
-    written, kept = (rows[np.lexsort((rows["x"], rows["frame"]))] for rows in (written, kept))
-    for name in ("frame", "x", "y"):
-        np.testing.assert_allclose(written[name], kept[name], atol=6e-4, rtol=0)
 
 
 @pytest.mark.parametrize("number", in_ci(signal.SIGINT, signal.SIGTERM))

@@ -39,8 +39,6 @@ def recording(kind: str, stop: int) -> tuple[FrameSet, ...]:
 
 @dataclass(frozen=True)
 class Run:
-    """Everything that a run gave."""
-
     steps: list[CommittedFrames]
     tracks: Tracks
     identity: Ints
@@ -48,12 +46,10 @@ class Run:
 
     @property
     def trajectory(self) -> Rows:
-        """All committed rows, before the whole run was looked at."""
         return np.concatenate([step.commit.trajectory for step in self.steps])
 
     @property
     def label(self) -> Labels:
-        """All labels, int32 (time, plane, y, x)."""
         return np.concatenate([step.commit.label for step in self.steps])
 
 
@@ -107,7 +103,7 @@ def test_three_walkers_are_three_tracks(kind: str, tracker: str) -> None:
         assert away.min(1).max() < 0.6 and (away.min(0) < 0.3).all()
 
 
-def test_boxes_of_the_tracks_are_those_of_the_people() -> None:
+def test_frames_have_boxes_candidates_and_windows_rates() -> None:
     done = whole("boxes", "cut")
     drawn = done.tracks.boxes
     assert np.unique(drawn["view"]).tolist() == [0, 1, 2, 3]
@@ -118,10 +114,6 @@ def test_boxes_of_the_tracks_are_those_of_the_people() -> None:
             assert isinstance(boxes, Boxes)
             off = np.abs(given[:, None] - boxes.pixel).max(2)
             assert off.min(1).max() < 5
-
-
-def test_every_frame_has_its_candidates() -> None:
-    done = whole("boxes", "cut")
     for step in done.steps:
         assert step.candidates.dtype == CANDIDATE and step.parts.shape == (len(step.candidates), 4)
         assert step.timings.dtype == TIMING
@@ -136,10 +128,6 @@ def test_every_frame_has_its_candidates() -> None:
     assert (timed["seconds"] >= 0).all()
     candidates = np.concatenate([step.candidates for step in done.steps])
     assert np.unique(candidates["frame"]).tolist() == list(range(FRAMES))
-
-
-def test_every_window_has_its_rates() -> None:
-    done = whole("boxes", "cut")
     for step in done.steps:
         assert step.rates.dtype == RATES
         assert step.rates["frame"].tolist() == [step.commit.frames[-1].frame] * 4
@@ -203,12 +191,9 @@ def test_short_recordings(frames: int) -> None:
     assert (done.identity == (done.trajectory["id"] if frames >= shortest else 0)).all()
 
 
-def test_no_frame_sets_no_steps() -> None:
+def test_no_frame_sets_and_an_empty_room() -> None:
     pipeline = Pipeline(RIG, ["boxes"] * 4, CONFIG, "cut")
     assert list(run_session(pipeline, [ViewForeground()] * 4, [], 0, lambda _: None)) == []
-
-
-def test_an_empty_room() -> None:
     nobody = TRUTH[:0]
     for kind in ("pixels", "boxes"):
         done = run(kind, list(FRAME_SETS[kind](RIG, nobody, 0, 10)))
@@ -245,16 +230,13 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_run_keeps_the_colours_of_people(scene: Path, tmp_path: Path) -> None:
+def test_runs_keep_colours_and_read_no_frames_in_vain(scene: Path, tmp_path: Path) -> None:
     run = stseg.track(scene / "beside.toml", tmp_path / "run.h5", volume="none")
     colours = run.appearance["colours"]
     assert len(colours) > 2 * IMAGE_FRAMES and np.isfinite(colours).all()
     assert {"images"} <= {name.decode() for name in run.provenance.sources["role"]}
-
-
-def test_frames_that_nobody_wants_are_not_read(scene: Path, tmp_path: Path) -> None:
     gone = tmp_path / "gone.toml"
     text = (scene / "beside.toml").read_text().replace('path = "cam', f'path = "{scene}/cam')
     gone.write_text(re.sub(r'images = .*"', f'images = {{ kind = "video", path = "{tmp_path}/none.avi"', text))
-    assert not len(stseg.track(gone, tmp_path / "run.h5", config=NOTHING, volume="none").appearance)
+    assert not len(stseg.track(gone, tmp_path / "gone.h5", config=NOTHING, volume="none").appearance)
     refused(SourceError, r"none\.avi", stseg.track, gone, tmp_path / "other.h5", volume="none")

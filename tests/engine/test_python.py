@@ -33,17 +33,13 @@ RIG = rig_of(corner_cameras())
 
 
 @compiled_only
-def test_track_does_what_the_command_does(rig_path: Path, tmp_path: Path) -> None:
+def test_track_does_what_the_command_does_with_no_output_too(rig_path: Path, tmp_path: Path) -> None:
     calls: list[tuple[str, int, int | None]] = []
     run = stseg.track(rig_path, tmp_path / "a.h5", frames=(0, 20), progress=lambda *call: calls.append(call))
     assert main(["run", str(rig_path), "-o", str(tmp_path / "b.h5"), "--frames", "0:20"]) == 0
     assert_same(run.path, tmp_path / "b.h5")
     assert calls[-1] == ("tracking", 20, 20)
     refused(stseg.InputError, r"a\.h5", stseg.track, rig_path, tmp_path / "a.h5", frames=(0, 20))
-
-
-@compiled_only
-def test_a_run_without_an_output_goes_with_its_object(rig_path: Path) -> None:
     run = stseg.track(str(rig_path), frames=(None, 10), tracker="frames", volume="none")
     path = run.path
     assert run.frames.tolist() == list(range(10))
@@ -119,7 +115,7 @@ def test_detections_of_other_libraries_are_boxes() -> None:
 
 
 @compiled_only
-def test_a_likelihood_is_a_mask_in_other_numbers() -> None:
+def test_likelihoods_are_masks_and_frames_left_out_blind() -> None:
     mask = np.zeros((len(RIG.cameras), *RIG.cameras[0].size[::-1]), np.uint8)
     mask[:, 20:60, 50:70] = 255
     given: list[Any] = [list(mask), dict(zip([c.name for c in RIG.cameras], mask / 255, strict=True))]
@@ -128,16 +124,16 @@ def test_a_likelihood_is_a_mask_in_other_numbers() -> None:
         tracker = stseg.Tracker(RIG, tracker="frames")
         volumes.append(np.concatenate([result.log_odds for result in [*tracker.add(views), *tracker.finish()]]))
     np.testing.assert_array_equal(volumes[0], volumes[1])
-
-
-@compiled_only
-def test_frames_that_are_left_out_are_blind() -> None:
     tracker = stseg.Tracker(RIG, tracker="frames")
     boxes = np.zeros((0, 4))
     results = [*tracker.add([boxes] * 4, frame=3), *tracker.add([boxes] * 4, frame=6), *tracker.finish()]
     assert np.concatenate([result.frames for result in results]).tolist() == [3, 4, 5, 6]
     refused(stseg.InputError, "frame 6", tracker.add, [boxes] * 4, frame=6)
     refused(stseg.InputError, r"frame set after finish", tracker.add, [boxes] * 4)
+    tracker = stseg.Tracker(RIG, tracker="frames")
+    tracker.add([Boxes(np.zeros((0, 4)), np.zeros(0)), None, None, None])
+    mask = np.zeros(RIG.cameras[0].size[::-1], np.uint8)
+    refused(stseg.InputError, "found masks, expected boxes", tracker.add, [mask, None, None, None])
 
 
 @pytest.mark.parametrize("frame", [float("nan"), 1.5, "2", 10**9])
@@ -162,14 +158,6 @@ def test_an_observation_that_does_not_suit_is_one_line(views: Any, complaint: st
     refused(stseg.InputError, complaint, stseg.Tracker(RIG).add, views)
 
 
-@compiled_only
-def test_a_camera_keeps_to_its_kind() -> None:
-    tracker = stseg.Tracker(RIG, tracker="frames")
-    tracker.add([Boxes(np.zeros((0, 4)), np.zeros(0)), None, None, None])
-    mask = np.zeros(RIG.cameras[0].size[::-1], np.uint8)
-    refused(stseg.InputError, "found masks, expected boxes", tracker.add, [mask, None, None, None])
-
-
 def test_rigs_from_arrays() -> None:
     matrices, sizes = [camera.projection for camera in RIG.cameras], [camera.size for camera in RIG.cameras]
     one = stseg.Rig.from_projections(matrices, sizes, RIG.grid, 10.0)
@@ -184,15 +172,7 @@ def test_rigs_from_arrays() -> None:
     refused(stseg.InputError, "different names", make, matrices, sizes, RIG.grid, 10.0, names=["a"] * 4)
 
 
-def test_the_volume_is_read_as_it_is_indexed(tmp_path: Path) -> None:
-    pytest.importorskip("xarray")
-    run = stseg.read_run(write_small_run(tmp_path / "run.h5"))
-    with h5py.File(run.path) as file:
-        np.testing.assert_array_equal(run.volume.label[1:3, 0], file["/entry/occupancy/label"][1:3, 0])
-    np.testing.assert_array_equal(run.volume_dataset().label.values, np.asarray(run.volume.label))
-
-
-def test_a_notebook_shows_the_plan_and_plays_the_film(tmp_path: Path) -> None:
+def test_a_notebook_reads_the_volume_and_plays_the_film(tmp_path: Path) -> None:
     run = stseg.read_run(write_small_run(tmp_path / "run.h5"))
     assert run._repr_html_().startswith(f"<p>Run({str(run.path)!r}".replace("'", "&#x27;"))
     shown = cv2.imdecode(np.frombuffer(run.plot()._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
@@ -201,13 +181,19 @@ def test_a_notebook_shows_the_plan_and_plays_the_film(tmp_path: Path) -> None:
     assert cv2.VideoCapture(str(film.path)).get(cv2.CAP_PROP_FRAME_COUNT) == 2
     assert film._repr_html_().startswith("<video")
     refused(OutputError, r"run.mp4: found a file", run.film, tmp_path / "run.mp4")
+    with h5py.File(run.path) as file:
+        np.testing.assert_array_equal(run.volume.label[1:3, 0], file["/entry/occupancy/label"][1:3, 0])
+    pytest.importorskip("xarray")
+    np.testing.assert_array_equal(run.volume_dataset().label.values, np.asarray(run.volume.label))
 
 
-def test_every_public_name_is_there_and_no_other() -> None:
+def test_every_public_name_is_there_and_the_command() -> None:
     assert {*stseg.__all__, "__version__"} == set(dir(stseg))
     for name in stseg.__all__:
         assert getattr(stseg, name).__name__ == name
     refused(AttributeError, "nothing_of_that_name", getattr, stseg, "nothing_of_that_name")
+    shown = subprocess.run([sys.executable, "-m", "stseg", "--version"], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == stseg.__version__
 
 
 @pytest.fixture(scope="module")
@@ -246,11 +232,6 @@ def test_a_public_object_shows_itself_in_ten_lines(name: str, instances: dict[st
     assert not shown.startswith("<stseg")
 
 
-def test_the_package_is_the_command() -> None:
-    shown = subprocess.run([sys.executable, "-m", "stseg", "--version"], capture_output=True, text=True, check=True)
-    assert shown.stdout.strip() == stseg.__version__
-
-
 def _dies_elsewhere(process: int) -> int:
     if os.getpid() != process:
         os._exit(1)
@@ -261,19 +242,13 @@ def _compiles() -> int:
     return int(numba.njit(lambda: 3)())
 
 
-def test_a_call_is_made_in_another_process_and_its_error_passes() -> None:
+def test_calls_are_made_in_other_processes_or_here_when_asked() -> None:
     with called_beside(print, os.getpid) as result:
         assert result() != os.getpid()
     with called_beside(print, FrameRange.parse, "none") as result:
         refused(ConfigError, "--frames", result)
-
-
-def test_a_call_whose_process_dies_is_made_here() -> None:
     with called_beside(print, _dies_elsewhere, os.getpid()) as result:
         assert result() == 7
-
-
-def test_a_call_here_is_made_once_its_result_is_asked_for() -> None:
     made = list[int]()
     with called_here(made.append, 1) as result:
         assert not made
@@ -290,28 +265,20 @@ def test_what_the_other_process_compiles_is_noted() -> None:
 
 
 @compiled_only
-def test_the_file_becomes_as_large_as_planned(rig_path: Path, tmp_path: Path, stdout: Command) -> None:
+def test_the_file_becomes_as_large_as_planned_in_words(rig_path: Path, tmp_path: Path, stdout: Command) -> None:
     plan = json.loads(stdout("plan", rig_path, *OPTIONS, "--workers", "1", "--json"))
     assert (plan["frames"], plan["segments"], plan["workers"]) == (FRAMES, 4, 1)
     assert plan["seconds"] == pytest.approx(sum(plan[k] for k in ("counting", "learning", "tracking", "joining")))
     assert min(plan["tracking"], plan["joining"]) > 0
     assert track(rig_path, tmp_path / "run.h5") == 0
     assert plan["file_bytes"] == pytest.approx((tmp_path / "run.h5").stat().st_size, rel=0.25)
-
-
-@compiled_only
-def test_it_is_told_in_words(rig_path: Path, stdout: Command) -> None:
     printed = stdout("plan", rig_path, *OPTIONS, "--frames", "0:20", "--workers", "3")
     assert all(words in printed for words in ("20 frames", "3 workers", "MiB an hour"))
 
 
 @compiled_only
-def test_workers_share_the_segments() -> None:
+def test_plans_share_segments_and_refuse_parts_that_are_none(rig_path: Path, refusal: Command) -> None:
     seconds = [Forecast(1000, 5, workers, 1.0, 2.0, 8.0, 3.0, 1).seconds for workers in (1, 2, 3, 5, 9)]
     assert seconds == pytest.approx([14.0, 10.0, 8.0, 6.0, 6.0])
-
-
-@compiled_only
-def test_a_part_that_is_none_is_refused(rig_path: Path, refusal: Command) -> None:
     said = f"--frames: found '10:400', expected a part of the recording's frames, 0:{FRAMES}"
     assert said in refusal("plan", rig_path, "--frames", "10:400")

@@ -115,7 +115,6 @@ def test_a_script_that_a_worker_runs_starts_none(monkeypatch: pytest.MonkeyPatch
 
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[Cluster]:
-    """With two workers."""
     with started_cluster(tmp_path) as found:
         yield found
 

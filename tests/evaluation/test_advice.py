@@ -46,13 +46,10 @@ def test_the_reading_that_would_match_is_named(
     assert advice is not None and re.search(f"if the truth is {named}", advice)
 
 
-def test_what_matches_as_it_is_gets_no_advice(tracks: Rows) -> None:
+def test_tracks_that_match_or_are_bad_get_no_advice(tracks: Rows) -> None:
     assert reading_advice(moved(tracks, 1), tracks, GATE) is None
     assert reading_advice(tracks[:0], tracks, GATE) is None
     assert reading_advice(tracks, tracks[:0], GATE) is None
-
-
-def test_bad_tracks_get_no_advice(tracks: Rows) -> None:
     chance, strange = np.random.default_rng(1), tracks.copy()
     low, high = strange["x"].min(), strange["x"].max()
     steps = chance.normal(0, 0.3, len(strange)).cumsum()

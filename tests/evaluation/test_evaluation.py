@@ -29,7 +29,6 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def table(rows: Iterable[tuple[int, int, float, float] | tuple[int, int, float, float, int]]) -> Rows:
-    """Rows of frame, id, x, y and perhaps flag."""
     return np.array([row if len(row) == 5 else (*row, 0) for row in rows], POSITION)
 
 
@@ -39,7 +38,6 @@ def walk(identity: int, y: float, frames: Iterable[int]) -> list[tuple[int, int,
 
 
 def with_ids(rows: Rows, where: Flags, ids: Ints | int) -> Rows:
-    """The rows with other ids in some of them."""
     renamed = rows.copy()
     renamed["id"] = np.where(where, ids, rows["id"])
     return renamed
@@ -120,39 +118,30 @@ def test_mostly_is_more_than_four_frames_of_five(found: int, lost: int, tracked:
     assert (scores.mostly_lost, scores.mostly_tracked) == (lost, tracked)
 
 
-def test_a_pair_is_kept_although_another_comes_nearer() -> None:
+def test_pairs_are_kept_and_more_are_better_than_nearer_ones() -> None:
     truth = table(walk(1, 0.0, range(3)))
     tracks = table([(0, 5, 0.0, 0.3), (1, 5, 0.1, 0.4), (1, 6, 0.1, 0.1), (2, 5, 0.2, 0.2), (2, 6, 0.2, 0.1)])
     scores = evaluate(truth, tracks)
     assert scores.switches == 0 and scores.motp == pytest.approx(0.3)
     assert scores.location_mean == pytest.approx(0.5 / 3)  # each frame by itself takes the nearer
-
-
-def test_more_pairs_are_better_than_nearer_ones() -> None:
     truth = table([(0, 1, 0.0, 0.0), (0, 2, 0.4, 0.0)])
     assert evaluate(truth, table([(0, 1, 0.4, 0.0), (0, 2, 0.85, 0.0)])).hits == 2
 
 
-def test_people_outside_and_their_tracks_do_not_count() -> None:
+def test_people_outside_do_not_count_but_false_tracks_do() -> None:
     stranger = walk(3, 9.0, TEN)
     outside = table(stranger + walk(4, 11.0, TEN))  # one follows the stranger, one follows no person
     scores = evaluate(np.concatenate([TWO, table(stranger)]), np.concatenate([TWO, outside]), area=(-1, -1, 3, 3))
     assert (scores.moda, scores.people, scores.tracks, scores.area) == (100, 2, 2, (-1, -1, 3, 3))
-
-
-def test_somebody_just_inside_may_be_found_just_outside() -> None:
     truth, tracks = table([(0, 1, 0.9, 0.0)]), table([(0, 1, 1.1, 0.0)])
     assert evaluate(truth, tracks, area=(-1, -1, 1, 1)).moda == 100
     assert evaluate(tracks, truth, area=(-1, -1, 1, 1)).detections == 0  # and the other way round none is judged
-
-
-def test_a_false_track_counts_though_a_person_stands_outside() -> None:
     truth = table([(0, 1, 0.0, 0.0), (0, 2, 1.5, 0.0)])
     scores = evaluate(truth, table([(0, 1, 0.0, 0.0), (0, 2, 1.5, 0.1), (0, 3, 0.9, 0.6)]), area=(-1, -1, 1, 1))
     assert (scores.hits, scores.false_alarms) == (1, 1)
 
 
-def test_flagged_rows_are_ignored_only_where_asked() -> None:
+def test_flags_and_frames_without_truth_count_where_asked() -> None:
     truth = TWO.copy()
     truth["flag"][truth["id"] == 2] = 3
     wrong = TWO.copy()
@@ -160,25 +149,9 @@ def test_flagged_rows_are_ignored_only_where_asked() -> None:
     assert evaluate(truth, wrong).people == 2
     scores = evaluate(truth, wrong, ignore_flagged=True)
     assert (scores.people, scores.tracks, scores.moda, scores.location_mean) == (1, 1, 100, 0)
-
-
-def test_frames_without_truth_count_where_asked_for() -> None:
     scores = evaluate(TWO, np.concatenate([TWO, table(walk(9, 0.0, range(10, 15)))]), frames=np.arange(15))
     assert (scores.frames, scores.false_alarms) == (15, 5)
     assert evaluate(TWO, TWO, frames=np.array([3, 4, 4])).frames == 2
-
-
-def test_scores_without_a_denominator_are_none() -> None:
-    no_truth, no_tracks = evaluate(TWO[:0], TWO), evaluate(TWO, TWO[:0])
-    assert (no_truth.frames, no_truth.moda, no_truth.mota, no_truth.recall) == (0, None, None, None)
-    figures = [no_tracks.moda, no_tracks.precision, no_tracks.location_mean, no_tracks.hota, no_tracks.idf1]
-    assert figures == [0, None, None, 0, 0]
-    assert no_tracks.mostly_lost == 2
-
-
-def test_a_trajectory_table_is_taken_as_it_is() -> None:
-    trajectory = table_of(TRAJECTORY, **{name: TWO[name] for name in ("frame", "id", "x", "y")})
-    assert evaluate(TWO, trajectory) == evaluate(TWO, TWO)
 
 
 def test_tables_areas_and_gates_that_cannot_be() -> None:
@@ -288,16 +261,11 @@ def judged_by_motmetrics(truth: Rows, tracks: Rows, gate: float) -> dict[str, fl
 
 @pytest.mark.filterwarnings("ignore")
 @drawn(24, SEEDS)
-def test_motmetrics_agrees_on_clear(seed: int) -> None:
+def test_motmetrics_agrees(seed: int) -> None:
     truth, tracks = lanes(seed)
     ours, theirs = evaluate(truth, tracks), judged_by_motmetrics(truth, tracks, 0.5)
     assert ours.mota == pytest.approx(100 * theirs["mota"])
     assert ours.motp == pytest.approx(theirs["motp"]) and ours.switches == theirs["num_switches"]
-
-
-@pytest.mark.filterwarnings("ignore")
-@drawn(24, SEEDS)
-def test_motmetrics_agrees_on_identity(seed: int) -> None:
     truth, tracks = crowd(seed)
     assert evaluate(truth, tracks).idf1 == pytest.approx(100 * judged_by_motmetrics(truth, tracks, 0.5)["idf1"])
 
@@ -311,15 +279,14 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "tracks.csv", tmp_path / "truth.csv"
 
 
-def test_the_table_says_what_it_was_taken_on(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_is_understood_and_says_what_it_took(
+    files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     command(*files, area="-1,-2,8,9")
     printed = capsys.readouterr().out
     assert "10 frames, gate 0.5 m, x -1 .. 8, y -2 .. 9 m" in printed
     assert "MODA 50.0 %" in printed and "misses 10" in printed
     assert len(printed.splitlines()) == 6  # nothing is wrapped
-
-
-def test_the_command_line_is_understood(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     app = App(result_action="return_value")
     app.command(command)
     for area in (["--area=-1,-1,9,9"], ["--area", "-1,-1,9,9"]):
@@ -363,13 +330,20 @@ def test_tracks_elsewhere_are_laid_on_truth(align: Literal["rigid", "similarity"
     assert aligned.scale == pytest.approx(scale if align == "similarity" else 1)
 
 
-def test_frames_without_rows_cost_nothing_and_break_continuity() -> None:
+def test_nothing_scores_none_costs_nothing_and_breaks_pairs() -> None:
     """Twenty million listed frames score as fifty do; between two frames that are far apart no pair continues."""
     tracks = [(0, 7, 0.0, 0.0), (40, 7, 0.3, 0.0), (40, 8, 0.1, 0.0), (41, 8, 0.3, 0.0), (41, 7, 0.1, 0.0)]
     truth, found = table([(0, 1, 0.0, 0.0), (40, 1, 0.0, 0.0), (41, 1, 0.0, 0.0)]), table(tracks)
     few, many = (evaluate(truth, found, frames=frames) for frames in (np.arange(50), range(20_000_000)))
     assert few.switches == 1 and few.frames == 50
     assert replace(many, frames=50) == few
+    no_truth, no_tracks = evaluate(TWO[:0], TWO), evaluate(TWO, TWO[:0])
+    assert (no_truth.frames, no_truth.moda, no_truth.mota, no_truth.recall) == (0, None, None, None)
+    figures = [no_tracks.moda, no_tracks.precision, no_tracks.location_mean, no_tracks.hota, no_tracks.idf1]
+    assert figures == [0, None, None, 0, 0]
+    assert no_tracks.mostly_lost == 2
+    trajectory = table_of(TRAJECTORY, **{name: TWO[name] for name in ("frame", "id", "x", "y")})
+    assert evaluate(TWO, trajectory) == evaluate(TWO, TWO)
 
 
 def test_a_crowd_is_scored_in_parts_as_it_is_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,7 +30,6 @@ RAMP = (np.arange(64 * 48 * 3, dtype=np.uint32).reshape(48, 64, 3) % 251).astype
 
 
 def text(name: str) -> bytes:
-    """The file of that name."""
     return (Path(__file__).parent / "files" / name).read_bytes()
 
 
@@ -85,7 +84,6 @@ def video(suffix: str, codec: str) -> Maker:
 
 
 def parquet(folder: Path) -> bytes:
-    """Boxes in Parquet."""
     arrow, tables = import_module("pyarrow"), import_module("pyarrow.parquet")
     columns = {"frame": [0, 3], "left": [1.0, 2.0], "top": [2, 3], "width": [9, 9], "height": [20, 21]}
     tables.write_table(arrow.table(columns | {"label": ["a", "b"]}), folder / "boxes.parquet")

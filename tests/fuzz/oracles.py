@@ -148,7 +148,6 @@ def require_rig(recording: Recording, path: Path) -> None:
 
 
 def require_numbers(most: float, *arrays: Floats) -> None:
-    """Finite numbers up to a size."""
     for array in arrays:
         assert (np.abs(array) <= most).all(), array
 
@@ -171,28 +170,24 @@ def require_cameras(cameras: Sequence[ForeignCamera], path: Path) -> None:
 
 
 def require_points(tables: Sequence[PointTable]) -> None:
-    """Correspondences of points."""
     assert 0 < sum(len(table.pixel) for table in tables) <= limits.POINTS
     assert all(is_name(table.camera) and len(table.pixel) for table in tables)
     require_numbers(limits.NUMBER, *(array for table in tables for array in (table.pixel, table.place)))
 
 
 def require_areas(areas: Sequence[tuple[str, tuple[Floats, ...]]]) -> None:
-    """Zones or lines."""
     assert 0 < len({name for name, _ in areas if is_title(name)}) == len(areas) <= limits.AREAS
     assert all(2 <= len(part) <= limits.CORNERS for _, parts in areas for part in parts)
     require_numbers(limits.METRES, *(part for _, parts in areas for part in parts))
 
 
 def require_answers(rows: Sequence[AnswerRow]) -> None:
-    """Answers about tracks."""
     for row in rows:
         assert (not row.name or is_title(row.name)) and row.action in ACTIONS, row
         assert all(0 <= number <= limits.FRAMES for number in (row.track, row.other, row.frame or 0))
 
 
 def require_run(run: Run) -> None:
-    """Frames and tracks of a run."""
     rows = run.trajectory
     with h5py.File(run.path) as file:
         assert (file.attrs["format"], file.attrs["format_version"]) == (layout.FORMAT, layout.VERSION)
@@ -214,7 +209,6 @@ def require_config(config: Config, given: Path) -> None:
 
 
 def require_tracks(rows: Rows, folder: Path) -> None:
-    """Tracks or truth."""
     assert (np.abs(rows["frame"]) <= limits.FRAMES).all()
     assert all((np.abs(rows[name]) <= limits.NUMBER).all() for name in ("x", "y"))
     assert len(np.unique(rows[["frame", "id"]])) == len(rows)

@@ -214,11 +214,8 @@ def farthest_of_own_walks(number: int, steps: int) -> float:
     return farthest
 
 
-def test_fields_of_inner_tuples_are_those_of_the_whole() -> None:
+def test_fields_of_inner_tuples_and_what_a_kernel_makes() -> None:
     walker = Walker(np.array([7]), Walk(np.array([1.0, 2.0, 4.0]), 2), 0.5)
     assert distance_by_address(walker) == distance(walker) == 1.5
     np.testing.assert_array_equal(walker.name, [-1])  # arrays are not copied
-
-
-def test_what_a_kernel_makes_itself_lasts_as_long_as_the_call() -> None:
     assert farthest_of_own_walks(200, 1000) == 199 * 0.5 * 1000

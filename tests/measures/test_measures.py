@@ -57,16 +57,13 @@ def test_motion_has_the_uncertainty_of_places() -> None:
         assert 0.55 < (np.abs(off) < found[f"{deviation}_deviation"]).mean() < 0.75
 
 
-def test_standing_on_a_line_is_no_traffic() -> None:
+def test_standing_on_a_line_and_being_away_are_no_traffic() -> None:
     sway = np.concatenate([np.linspace(-2, -0.02, 20), 0.05 * (-1.0) ** np.arange(41), np.linspace(0.02, 2, 20)])
     assert measure_tracks(walk(1, sway), np.arange(81), 10.0, GRID, Areas((), (UP,))).lines["right"].tolist() == [1]
     back = np.concatenate([np.linspace(-2, 1, 31), np.linspace(1, -2, 31)])
     (line,) = measure_tracks(walk(1, back), np.arange(62), 10.0, GRID, Areas((), (UP,))).lines
     assert (line["left"], line["right"]) == (1, 1)
-
-
-def test_the_way_from_exit_to_entrance_is_nobodys() -> None:
-    """A person leaves to the left of a line and comes back on its right a minute later."""
+    # A person leaves to the left of a line and comes back on its right a minute later.
     first, second = walk(1, np.linspace(-0.5, -2.0, 16)), walk(1, np.linspace(2.0, 0.5, 16))
     second["frame"] += 600
     found = measure_tracks(np.concatenate([first, second]), np.arange(700), 10.0, GRID, Areas((), (UP,)))
@@ -147,16 +144,13 @@ def test_malformed_geojson_is_named(tmp_path: Path, text: str, message: str) -> 
     refused(FormatError, "found", read_lines, path)
 
 
-def test_areas_beside_the_ground_are_refused(tmp_path: Path) -> None:
+def test_areas_lie_on_the_ground_and_need_not_be_closed(tmp_path: Path) -> None:
     run, path = write_small_run(tmp_path / "run.h5"), tmp_path / "areas.geojson"
     path.write_text(json.dumps(feature("Polygon", [[[11.5, 48.1], [11.6, 48.1], [11.6, 48.2]]])))
     match = r"areas.geojson: zone a: found x 11.5 to 11.6, y 48.1 to 48.2, expected metres on the ground, which is x"
     refused(FormatError, match, stseg.measure, run, path)
     path.write_text(json.dumps(feature("LineString", [[-90, 0], [-80, 0]])))
     refused(FormatError, "line a: found x -90 to -80", stseg.measure, run, None, path)
-
-
-def test_a_ring_needs_not_be_closed(tmp_path: Path) -> None:
     path = tmp_path / "zones.geojson"
     path.write_text(json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 0], [1, 1], [0, 0]]])))
     ((_, (open_ring, closed_ring)),) = read_polygons(path)

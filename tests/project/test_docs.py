@@ -60,32 +60,30 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
-def test_files_and_commands_named_are_there(page: Path) -> None:
+def test_files_commands_and_keys_named_exist_and_no_commit(page: Path) -> None:
     text = page.read_text("utf-8")
     assert set(re.findall(r"(?:`|^)stseg (\w+)\b", text, re.MULTILINE)) <= {*COMMANDS, "COMMAND"}
     for path in re.findall(r"\b(?:stseg|io|tools|tests|docs)/[\w./*-]*\w\.(?:py|md|json|toml)\b", text):
         assert any(ROOT.glob(path)) or path in _EXAMPLES, path
+    named = re.findall(rf"`((?:{'|'.join(SECTIONS)})\.[a-z_.]*[a-z_])", text) + re.findall(r"--set ([\w.]+)=", text)
+    for key in named:
+        assert key in KEYS or any(known.startswith(f"{key}.") for known in KEYS), key
+    assert not re.findall(r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*[0-9])[0-9a-f]{7,40}\b", text)
 
 
 _EXAMPLES = {"stseg/foreground/median.py", "stseg/trackers/nearest.py", "io/exports/NAME.py", "io/calibrations/NAME.py"}
 """Files that the page on contributing invents."""
 
 
-@pytest.mark.parametrize("page", PAGES, ids=NAMES)
-def test_configuration_keys_named_exist(page: Path) -> None:
-    text = page.read_text("utf-8")
-    named = re.findall(rf"`((?:{'|'.join(SECTIONS)})\.[a-z_.]*[a-z_])", text) + re.findall(r"--set ([\w.]+)=", text)
-    for key in named:
-        assert key in KEYS or any(known.startswith(f"{key}.") for known in KEYS), key
-
-
-def test_the_drawing_of_rooms_shows_all_of_them() -> None:
+def test_rooms_are_drawn_and_pages_for_developers_short() -> None:
     page = (DOCS / "development" / "architecture.md").read_text("utf-8")
     rooms = {folder.name for folder in (ROOT / "stseg").iterdir() if any(folder.glob("*.py"))}
     assert {*rooms, "io"} <= set(re.findall(r"\w+", page.partition("```text")[2].partition("```")[0]))
+    words = [word for page in DEVELOPMENT.glob("*.md") for word in page.read_text("utf-8").split()]
+    assert sum(bool(re.search(r"\w", word)) for word in words) <= DEVELOPMENT_WORDS
 
 
-def test_every_page_is_reached_from_the_readme() -> None:
+def test_the_readme_leads_to_every_page_and_ci_runs_its_tests() -> None:
     reached, waiting = set[Path](), [ROOT / "README.md"]
     while waiting:
         page = waiting.pop()
@@ -94,16 +92,8 @@ def test_every_page_is_reached_from_the_readme() -> None:
             links = re.findall(r"\]\((?!https?:)([^)#]+\.md)", page.read_text("utf-8"))
             waiting += [(page.parent / link).resolve() for link in links]
     assert set(PAGES) <= reached
-
-
-def test_the_pages_for_developers_are_short() -> None:
-    words = [word for page in DEVELOPMENT.glob("*.md") for word in page.read_text("utf-8").split()]
-    assert sum(bool(re.search(r"\w", word)) for word in words) <= DEVELOPMENT_WORDS
-
-
-@pytest.mark.parametrize("page", PAGES, ids=NAMES)
-def test_no_page_names_a_commit(page: Path) -> None:
-    assert not re.findall(r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*[0-9])[0-9a-f]{7,40}\b", page.read_text("utf-8"))
+    (command,) = re.findall(r"^python3 -m venv .* (-m pytest .*)$", README, re.MULTILINE)
+    assert f'"$bin/python" {command} -m' in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
 ARCHITECTURE = (DEVELOPMENT / "architecture.md").read_text("utf-8")
@@ -127,13 +117,10 @@ def test_every_equation_of_a_paper_has_a_row(paper: str) -> None:
     assert listed == set(range(1, EQUATIONS[paper] + 1))
 
 
-def test_the_table_of_keys_is_that_of_the_configuration() -> None:
+def test_keys_are_those_of_the_configuration_and_a_rig_is_shown() -> None:
     page = configuration_page.PAGE.read_text("utf-8")
     assert page == configuration_page.rewritten(page), "python tools/configuration_page.py writes it anew"
     assert all(f"| `{name}` |" in page for name in TRACKERS)
-
-
-def test_the_rig_file_shown_is_one() -> None:
     (text,) = re.findall(r"```toml\n(format.*?)```", INPUTS, re.DOTALL)
     recording = parse_rig(text, ROOT / "room.toml")
     assert [camera.name for camera in recording.rig.cameras] == ["cam1", "cam2"]
@@ -159,23 +146,15 @@ def test_keys_of_the_rig_file_named_exist(page: Path) -> None:
     assert set(re.findall(r"`(\w+) = ", page.read_text("utf-8"))) <= known
 
 
-def test_every_array_and_column_of_the_run_file_is_described() -> None:
+def test_arrays_columns_and_formats_are_described() -> None:
     for field in layout.FIELDS:
         assert re.search(rf"^ +.*\b{field.name}\b", OUTPUTS, re.MULTILINE)
     for name, dtype in layout.table_types(1).items():
         (row,) = re.findall(rf"^\| `/{name}`.*$", OUTPUTS, re.MULTILINE)
         assert set(dtype.names or ()) <= set(re.findall(r"\w+", row.partition("|")[2]))
-
-
-def test_every_format_has_a_row() -> None:
     assert all(f"| `{name}` |" in OUTPUTS for name in EXPORTS)
     rigs = (DOCS / "rigs.md").read_text("utf-8")
     assert all(f"`{name}`" in rigs for name in CALIBRATIONS)
-
-
-def test_ci_runs_the_test_command_of_the_readme() -> None:
-    (command,) = re.findall(r"^python3 -m venv .* (-m pytest .*)$", README, re.MULTILINE)
-    assert f'"$bin/python" {command} -m' in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
 _CODE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -39,7 +39,7 @@ def walked(*places: tuple[float, float]) -> pandas.DataFrame:
     return pandas.DataFrame({"frame": frame, "id": 1, "x": x, "y": y, "time": frame.astype(float)})
 
 
-def test_a_line_is_crossed_between_its_ends_and_to_one_side() -> None:
+def test_lines_are_crossed_and_speed_is_of_a_steady_walk() -> None:
     start, stop = np.array([0.0, 0.0]), np.array([2.0, 0.0])
     there_and_back = flow_and_density.crossings(walked((1, -1), (1, 1), (1, -1)), start, stop)
     assert there_and_back[["time", "direction"]].to_numpy().tolist() == [[1, 1], [2, -1]]
@@ -47,16 +47,13 @@ def test_a_line_is_crossed_between_its_ends_and_to_one_side() -> None:
     assert len(flow_and_density.crossings(walked((1, -2), (1, -1)), start, stop)) == 0
     other = walked((1, 1), (1, 2)).assign(id=2)
     assert len(flow_and_density.crossings(pandas.concat([walked((1, -2), (1, -1)), other]), start, stop)) == 0
-
-
-def test_speed_is_that_of_a_steady_walk() -> None:
     table = walked(*((0.3 * step, 0.4 * step) for step in range(9)))
     found = flow_and_density.speeds(table, 1.0)
     np.testing.assert_allclose(found["speed"], 0.5)
     assert found["frame"].tolist() == list(range(1, 8))
 
 
-def test_the_flow_is_pedpy_s(run: Run) -> None:
+def test_flow_speed_and_density_are_pedpy_s_and_printed(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     table = run.data_frame("trajectory")
     found = flow_and_density.crossings(table, np.array([-3.0, 0.0]), np.array([3.0, 0.0]))
     line = pedpy.MeasurementLine([(-3, 0), (3, 0)])
@@ -65,18 +62,11 @@ def test_the_flow_is_pedpy_s(run: Run) -> None:
     first = (found.groupby("id")["time"].min() * run.frame_rate).round().astype(int)  # PedPy counts who crosses once
     first = first[first < run.frames[-1]]  # and not in the last frame
     assert first.to_dict() == dict(zip(crossing["id"], crossing["frame"], strict=True)) and len(first) > 3
-
-
-def test_speed_and_density_are_those_of_people(run: Run) -> None:
     table = flow_and_density.speed_over_density(run.data_frame("trajectory"), run.frame_rate, 36.0)
     assert ((table["mean"] > 0) & (table["mean"] < 2)).all()
-    data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run.path)
     area = pedpy.MeasurementArea([(-3, -3), (3, -3), (3, 3), (-3, 3)])
     density = pedpy.compute_classic_density(traj_data=data, measurement_area=area)["density"]
     assert table.index.min() - 0.051 <= density.min() and density.max() <= table.index.max() + 0.051
-
-
-def test_it_prints_both(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     flow_and_density.main(str(run.path))
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("to the left of the line: ")

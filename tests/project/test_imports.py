@@ -101,31 +101,22 @@ def test_every_other_library_is_numpy_scipy_or_of_python_itself() -> None:
         assert {name.split(".")[0] for name in module.imports} <= known, module.name
 
 
-def test_only_commands_print() -> None:
+def test_only_commands_print_and_no_drawer_is_for_odds_and_ends() -> None:
     calls = [(file.part, node) for file in modules() for node in ast.walk(file.tree) if isinstance(node, ast.Call)]
     assert {part for part, node in calls if getattr(node.func, "id", "") == "print"} == {"commands"}
-
-
-def test_no_drawer_for_odds_and_ends() -> None:
     for module in modules():
         assert not {"utils", "util", "helpers", "misc", "common"} & set(module.name.split("."))
-
-
-def test_io_is_a_linked_folder_without_init() -> None:
     # With an __init__.py, io would hide Python's own io from type checkers and, without frozen modules, from Python.
     assert not (ROOT / "io" / "__init__.py").exists()
     assert (ROOT / "stseg" / "io" / "track_csv.py").samefile(ROOT / "io" / "track_csv.py")
 
 
-def test_a_run_imports_no_library_that_it_does_not_use() -> None:
+def test_a_run_imports_no_library_or_baseline_in_vain() -> None:
     imported = "stseg.commands.terminal.standard_error, stseg.engine.track, stseg.tasks.warnings"
     started = f"import {imported}, sys; print(*sys.modules)"
     found = set(process(started).stdout.split())
     assert "stseg.engine.track" in found
     assert not {"rich", "ssl", "scipy.optimize", "stseg.engine.live.following"} & found
-
-
-def test_a_default_run_imports_no_baseline() -> None:
     made = (
         "import sys, stseg.engine.track, stseg.engine.live.following, stseg.commands.run\n"
         "from scenes import CONFIG, room\n"

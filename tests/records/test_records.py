@@ -20,16 +20,13 @@ from stseg.records.tables import TRAJECTORY, Tracks
 from stseg.records.track_heights import with_heights
 
 
-def test_memory_is_in_seconds_and_at_least_some_frames() -> None:
+def test_memory_is_in_seconds_of_rows_and_skipped_frames() -> None:
     for rate, memory, least, frames in ((10.0, 2.0, 0.0, 20), (10.0, 0.1, 3.0, 3)):
         forgetting = Forgetting((2,), rate, memory, least)
         forgetting.add(np.array([1.0, 2.0]))
         for _ in range(frames):
             forgetting.forget()
         np.testing.assert_allclose(forgetting.sums, np.exp(-1) * np.array([1.0, 2.0]))
-
-
-def test_skipped_frames_count_with_the_next() -> None:
     skipped, whole = (Forgetting((1,), 10.0, 1.0) for _ in range(2))
     for forgetting in (skipped, whole):
         forgetting.add(np.ones(1))
@@ -41,9 +38,6 @@ def test_skipped_frames_count_with_the_next() -> None:
     assert skipped.seconds(np.ones(1)) == whole.seconds(np.ones(1)) == pytest.approx(0.4)
     skipped.forget()
     assert skipped.seconds(np.ones(1)) == pytest.approx(0.1)
-
-
-def test_rows_are_forgotten_by_themselves() -> None:
     forgetting = Forgetting((2, 3), 5.0, 1.0)
     forgetting.add(np.ones((2, 3)))
     forgetting.forget(1)
@@ -73,23 +67,17 @@ def test_evidence_that_counts_twice_is_calibrated() -> None:
     assert (np.diff(reliability.probability) >= 0).all()
 
 
-def test_nothing_counted_is_a_half() -> None:
+def test_cells_are_filled_in_doubt_or_a_half_where_uncounted() -> None:
     np.testing.assert_array_equal(cell_reliability.CellReliability.of([]).probability, 0.5)
     empty = cell_reliability.CellCounts(
         np.zeros(len(cell_reliability.LOG_ODDS_KNOTS)), np.zeros(len(cell_reliability.LOG_ODDS_KNOTS))
     )
     np.testing.assert_array_equal(cell_reliability.CellReliability.of([empty]).probability, 0.5)
-
-
-def test_cells_that_anybody_fills() -> None:
     both = people((0.3, 0.3, 1.5), (-0.4, 0.0, 1.9))
     apart = [cell_reliability.filled_cells(GRID, both[k : k + 1]) for k in range(2)]
     np.testing.assert_array_equal(cell_reliability.filled_cells(GRID, both), apart[0] | apart[1])
     assert [cells.any((1, 2)).sum() for cells in apart] == [8, 10]
-
-
-def test_cells_in_doubt() -> None:
-    """Seen cells: all within a metre of somebody, and elsewhere those of little evidence."""
+    # Seen cells: all within a metre of somebody, and elsewhere those of little evidence.
     log_odds = np.full(GRID.shape, -9.0, np.float32)
     log_odds[0, 0, :2] = 1.0, np.nan
     found = cell_reliability.doubtful_cells(GRID, log_odds, people((0.9, 0.9, 1.7)))
@@ -107,16 +95,13 @@ def test_of_a_run_file(tmp_path: Path) -> None:
     assert (np.diff(probability[seen][order]) >= 0).all() and 0 < probability[seen].mean() < 1
 
 
-def test_sizes_that_the_evidence_left_open_are_unmeasured() -> None:
+def test_a_track_has_the_median_of_sizes_that_are_measured() -> None:
     config = BodyConfig()
     open_sizes = Sizes.of_population(2, config)
     sizes = replace(open_sizes, height=np.array([1.6, 1.8]), height_variance=np.array([1e-3, config.height_spread**2]))
     height, width = sizes.measured(config)
     np.testing.assert_array_equal(height, [1.6, np.nan])
     assert np.isnan(width).all()
-
-
-def test_a_track_has_the_median_of_its_measured_sizes() -> None:
     rows = table_of(TRAJECTORY, frame=[0, 0, 1, 2, 3], id=[1, 2, 1, 1, 1], height=[1.6, np.nan, np.nan, 1.7, 1.75])
     assert with_heights(rows)["height"] == pytest.approx([1.6, BODY_HEIGHT, 1.7, 1.7, 1.75])
     np.testing.assert_array_equal(Tracks(rows).summary()["height"], np.array([1.7, np.nan], np.float32))

@@ -51,7 +51,7 @@ def test_a_sheet_gives_the_log_odds_back() -> None:
         np.testing.assert_allclose(read[grey > 0], clipped[grey > 0], atol=0.51 * sheets.limit / 63)
 
 
-def test_sheets_keep_to_their_budget_and_to_what_is_wanted() -> None:
+def test_sheets_keep_to_their_budget_also_of_large_ground() -> None:
     frames = np.arange(200)
     whole = thin_sheets(frames, GRID, volume_of, 10**7, NO_FRAMES)
     budget = sum(map(len, whole.pngs)) // 3
@@ -61,9 +61,6 @@ def test_sheets_keep_to_their_budget_and_to_what_is_wanted() -> None:
     assert sum(map(len, thin.pngs)) - len(thin.pngs[thin.frames.tolist().index(77)]) <= budget
     assert len(thin_sheets(np.arange(5000), GRID, volume_of, 10**9, NO_FRAMES).frames) == 400
     assert thin_sheets(NO_FRAMES, GRID, volume_of, 10**6, NO_FRAMES).pngs == []
-
-
-def test_large_ground_is_shown_by_the_greatest_of_some_cells() -> None:
     log_odds = np.full((1, 5, 4), np.nan, np.float32)
     log_odds[0, 0, 0], log_odds[0, 1, 1], log_odds[0, 4, 3] = -2, 1, -1
     found = coarse(log_odds, 2)
@@ -108,7 +105,7 @@ def embedded(trajectory: Rows, candidates: Rows, frames: AnyArray, tmp_path: Pat
     return found
 
 
-def test_places_come_back_to_the_centimetre(tmp_path: Path) -> None:
+def test_places_come_back_and_candidates_say_why_they_went(tmp_path: Path) -> None:
     table = walks(40, 3)
     tracks = embedded(table, run_files.small_ghosts(), np.arange(40), tmp_path)["tracks"]
     assert isinstance(tracks, dict)
@@ -121,9 +118,6 @@ def test_places_come_back_to_the_centimetre(tmp_path: Path) -> None:
     np.testing.assert_allclose(x * tracks["quantum"], table["x"][order], atol=0.0051)
     np.testing.assert_allclose(y * tracks["quantum"], table["y"][order], atol=0.0051)
     assert tracks["counts"] == [40, 40, 40]
-
-
-def test_candidates_say_why_they_were_dropped(tmp_path: Path) -> None:
     data = embedded(walks(1, 1), run_files.small_ghosts(), np.array([10, 12]), tmp_path)
     assert data["ghosts"] == [1, 0]
     assert data["candidates"] == [[[0, 0, 0, -1, [2, 0]], [0, 0, 0, 0, [-1, 0]]], []]
@@ -177,16 +171,13 @@ def answers_of(places: list[DwellPlace], shares: list[float], dropped: int = 0) 
     return [re.sub("<[^>]+>", "", answer) for _, answer in found]
 
 
-def test_the_four_questions_are_answered() -> None:
+def test_the_four_questions_are_answered_of_even_crowds_too() -> None:
     people, places, ghosts, blind = answers_of(PLACES, [0.1, 0.25, 0.65], 2)
     assert people.startswith("1.5 at a time on average, at most 2. There are 2 tracks, half of them 0.9 s or longer")
     assert "A at (1.0, 2.0), 40 %; B at (-1.0, 0.0), 20 %" in places
     assert ghosts.startswith("1 of 3 candidates (0.2 a frame): 100 % because a view sees nobody there.")
     assert ghosts.endswith("2 tracks too short or too uncertain were dropped as well.")
     assert blind.startswith("10 % of the ground is seen by no view, 25 % by one alone") and "65 % by two" in blind
-
-
-def test_an_even_crowd_dwells_nowhere() -> None:
     _, places, ghosts, _ = answers_of([], [0, 0, 1])
     assert places.startswith("Nowhere in particular")
     assert "too short" not in ghosts

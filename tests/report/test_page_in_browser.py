@@ -43,11 +43,22 @@ def slide(page: Page, index: int) -> None:
     page.ask(f"slider.value = '{index}'; slider.dispatchEvent(new Event('input')); 0")
 
 
-def test_it_loads_without_a_complaint_or_a_request(page: Page) -> None:
+def test_it_loads_alone_and_address_menu_and_play_choose(page: Page) -> None:
     pictures(page)
     assert page.complaints == page.requests == []
     assert page.ask("document.images.length > 5 && [...document.images].every((image) => image.naturalWidth > 0)")
     assert page.picture(420, 900) and page.ask("document.documentElement.scrollWidth <= innerWidth"), "a telephone"
+    page.ask("location.hash = 'frame=13'; 0")
+    page.wait_for("document.getElementById('clock').textContent.includes('frame 13')")
+    greatest = pictures(page)[1]
+    page.ask("plane.value = '1'; plane.dispatchEvent(new Event('change')); 0")
+    assert pictures(page)[1] != greatest
+    page.ask("plane.value = 'greatest'; plane.dispatchEvent(new Event('change')); 0")
+    assert pictures(page)[1] == greatest
+    slide(page, 3)
+    page.ask("play.click(); 0")
+    page.wait_for("document.getElementById('clock').textContent.includes('frame 15')")
+    page.wait_for("play.textContent === 'Play'")
 
 
 def test_the_complaints_of_a_page_would_be_heard(folder: Path, tmp_path: Path) -> None:
@@ -60,7 +71,7 @@ def test_the_complaints_of_a_page_would_be_heard(folder: Path, tmp_path: Path) -
         assert len(browser.complaints) >= 2
 
 
-def test_the_slider_moves_every_picture(page: Page) -> None:
+def test_the_slider_moves_pictures_and_lists_candidates(page: Page) -> None:
     slide(page, 0)
     early = pictures(page)
     assert page.ask("document.getElementById('clock').textContent").startswith("2.0 s, frame 10: 1 people, 1 ghosts")
@@ -70,40 +81,17 @@ def test_the_slider_moves_every_picture(page: Page) -> None:
     assert all(before != after for before, after in zip(early, late, strict=True))
     slide(page, 0)
     assert pictures(page) == early
-
-
-def test_candidates_of_the_frame_are_listed_with_their_reason(page: Page) -> None:
     slide(page, 0)
     rows = page.ask("[...document.getElementById('weighed').rows].map((row) => row.innerText)")
     assert len(rows) == 2
     assert any("ghost a" in row and "no -1.0" in row and "a view sees nobody there" in row for row in rows)
 
 
-def test_the_address_chooses_the_frame_and_the_menu_the_plane(page: Page) -> None:
-    page.ask("location.hash = 'frame=13'; 0")
-    page.wait_for("document.getElementById('clock').textContent.includes('frame 13')")
-    greatest = pictures(page)[1]
-    page.ask("plane.value = '1'; plane.dispatchEvent(new Event('change')); 0")
-    assert pictures(page)[1] != greatest
-    page.ask("plane.value = 'greatest'; plane.dispatchEvent(new Event('change')); 0")
-    assert pictures(page)[1] == greatest
-
-
-def test_a_drag_turns_the_tracks(page: Page) -> None:
+def test_a_drag_turns_the_tracks_and_one_path_is_shown(page: Page) -> None:
     before = pictures(page)
     page.ask("thread.onpointermove({ buttons: 1, movementX: 40, movementY: 10 }); 0")
     after = pictures(page)
     assert [old == new for old, new in zip(before, after, strict=True)] == [True, True, False]
-
-
-def test_play_goes_on_to_the_end_and_stops(page: Page) -> None:
-    slide(page, 3)
-    page.ask("play.click(); 0")
-    page.wait_for("document.getElementById('clock').textContent.includes('frame 15')")
-    page.wait_for("play.textContent === 'Play'")
-
-
-def test_the_path_of_one_track_is_shown(page: Page) -> None:
     slide(page, 0)
     before = pictures(page)
     page.ask("whose.value = '1'; whose.onchange(); 0")

@@ -45,68 +45,12 @@ def has(picture: Bytes, colour: tuple[int, int, int]) -> bool:
     return bool((picture == colour).all(axis=-1).any())
 
 
-def test_few_tracks_have_distinct_colours() -> None:
+def test_few_tracks_have_distinct_colours_and_many_are_thin() -> None:
     colours = np.array([track_colour(k) for k in range(1, 9)], float)
     distances = np.linalg.norm(colours[:, None] - colours[None], axis=-1) + 1e3 * np.eye(8)
     assert distances.min() > 60
     assert all(np.linalg.norm(colours - ground, axis=1).min() > 100 for ground in (PAPER, NIGHT))
 
-
-def test_the_plan_shows_a_track_at_its_places_in_its_colour() -> None:
-    path = [(frame, 7, 0.5 + 0.25 * frame, 1.5 - 0.2 * frame) for frame in range(12)]
-    picture = plan_view(RIG, trajectory_of(*path))
-    plan = plan_map(RIG)
-    assert picture.shape == (plan.size[1], plan.size[0], 3)
-    for _, identity, x, y in path[:-1]:
-        assert at(picture, plan.pixel(np.array([x, y]))) == track_colour(identity)
-
-
-def test_in_the_plan_y_points_up_and_x_to_the_right() -> None:
-    plan = plan_map(RIG)
-    low, high = plan.pixel(np.array([[1.0, 0.0], [3.0, 1.0]]))
-    assert high[0] > low[0] and high[1] < low[1]
-    np.testing.assert_allclose(high - low, [2 * plan.scale, -plan.scale])
-    picture = plan_view(RIG, trajectory_of((0, 1, 1.0, -0.5), (0, 2, 1.0, 1.5)))
-    assert at(picture, plan.pixel(np.array([1.0, -0.5]))) == track_colour(1)
-    assert at(picture, plan.pixel(np.array([1.0, 1.5]))) == track_colour(2)
-
-
-def test_the_plan_shades_what_few_views_see_at_its_place() -> None:
-    coverage = np.full(GRID.shape[1:], 3, np.uint8)
-    coverage[0, -1] = 0  # least y, greatest x
-    picture = plan_view(RIG, trajectory_of(), None, coverage)
-    plan = plan_map(RIG)
-    unseen, *lighter = (at(picture, plan.pixel(np.array(place))) for place in ((3.8, -0.8), (3.8, 1.8), (0.3, -0.8)))
-    assert all(max(unseen) < min(other) for other in lighter)
-
-
-def test_a_gap_of_a_track_is_no_solid_line() -> None:
-    plan = plan_map(RIG)
-    whole = [(frame, 1, 0.5 + 0.1 * frame, 0.3) for frame in range(30)]
-    torn = [row for row in whole if not 10 <= row[0] < 20]
-    between = plan.pixel(np.stack([np.linspace(1.55, 2.35, 60), np.full(60, 0.3)], -1))
-    pictures = [plan_view(RIG, trajectory_of(*rows)) for rows in (whole, torn)]
-    assert [sum(at(picture, pixel) == track_colour(1) for pixel in between) for picture in pictures] == [60, 0]
-
-
-def test_truth_is_dashed_and_leaves_the_tracks_visible() -> None:
-    truth = trajectory_of(*((frame, 9, 0.5 + 0.1 * frame, 1.0) for frame in range(30)))
-    plain, both = (plan_view(RIG, trajectory_of((0, 1, 1.0, 0.0)), table) for table in (None, truth))
-    line = np.rint(plan_map(RIG).pixel(np.stack([np.linspace(0.5, 3.4, 400), np.full(400, 1.0)], -1))).astype(int)
-    dark = both[line[:, 1], line[:, 0]].max(axis=1) < 130
-    assert 0.3 < dark.mean() < 0.8
-    assert not (plain[line[:, 1], line[:, 0]].max(axis=1) < 130).any()
-
-
-def test_sparse_truth_is_one_line_though_frames_are_missing() -> None:
-    dense = trajectory_of(*((frame, 1, 0.5 + 0.1 * frame, 1.0) for frame in range(20)))
-    sparse = dense.copy()
-    sparse["frame"] *= 10
-    pictures = [plan_view(RIG, trajectory_of(), truth) for truth in (dense, sparse)]
-    np.testing.assert_array_equal(pictures[0], pictures[1])
-
-
-def test_many_tracks_are_drawn_thinner() -> None:
     def painted(count: int) -> float:
         rows = [(frame, k, 0.2 + 0.1 * frame, -0.9 + 2.8 * k / count) for k in range(count) for frame in range(35)]
         picture = plan_view(RIG, trajectory_of(*rows))
@@ -118,18 +62,55 @@ def test_many_tracks_are_drawn_thinner() -> None:
     assert few >= 3 > 2 >= many > 0
 
 
-def test_a_camera_that_is_far_away_does_not_shrink_the_plan() -> None:
+def test_the_plan_shows_tracks_at_their_places_without_gaps() -> None:
+    path = [(frame, 7, 0.5 + 0.25 * frame, 1.5 - 0.2 * frame) for frame in range(12)]
+    picture = plan_view(RIG, trajectory_of(*path))
+    plan = plan_map(RIG)
+    assert picture.shape == (plan.size[1], plan.size[0], 3)
+    for _, identity, x, y in path[:-1]:
+        assert at(picture, plan.pixel(np.array([x, y]))) == track_colour(identity)
+    low, high = plan.pixel(np.array([[1.0, 0.0], [3.0, 1.0]]))
+    assert high[0] > low[0] and high[1] < low[1]
+    np.testing.assert_allclose(high - low, [2 * plan.scale, -plan.scale])
+    picture = plan_view(RIG, trajectory_of((0, 1, 1.0, -0.5), (0, 2, 1.0, 1.5)))
+    assert at(picture, plan.pixel(np.array([1.0, -0.5]))) == track_colour(1)
+    assert at(picture, plan.pixel(np.array([1.0, 1.5]))) == track_colour(2)
+    whole = [(frame, 1, 0.5 + 0.1 * frame, 0.3) for frame in range(30)]
+    torn = [row for row in whole if not 10 <= row[0] < 20]
+    between = plan.pixel(np.stack([np.linspace(1.55, 2.35, 60), np.full(60, 0.3)], -1))
+    pictures = [plan_view(RIG, trajectory_of(*rows)) for rows in (whole, torn)]
+    assert [sum(at(picture, pixel) == track_colour(1) for pixel in between) for picture in pictures] == [60, 0]
+
+
+def test_the_plan_shades_few_views_and_holds_any_camera(tmp_path: Path) -> None:
+    coverage = np.full(GRID.shape[1:], 3, np.uint8)
+    coverage[0, -1] = 0  # least y, greatest x
+    picture = plan_view(RIG, trajectory_of(), None, coverage)
+    plan = plan_map(RIG)
+    unseen, *lighter = (at(picture, plan.pixel(np.array(place))) for place in ((3.8, -0.8), (3.8, 1.8), (0.3, -0.8)))
+    assert all(max(unseen) < min(other) for other in lighter)
     far = Rig("hall", 5.0, GRID, (front_camera(-500.0),))
     alone = Rig("hall", 5.0, GRID, ())
     assert plan_map(far) == plan_map(alone)
     assert not np.array_equal(plan_view(far, trajectory_of()), plan_view(alone, trajectory_of()))
-
-
-def test_a_camera_that_looks_down_has_a_place_but_no_wedge(tmp_path: Path) -> None:
     rig = run_files.small_recording(tmp_path).rig
     picture = plan_view(rig, trajectory_of(), width=900, height=900)
     place = plan_map(rig, 900, 900).pixel(rig.cameras[0].centre[:2])
     assert picture.shape[2] == 3 and np.isfinite(place).all()
+
+
+def test_truth_is_a_dashed_line_that_leaves_tracks_visible() -> None:
+    truth = trajectory_of(*((frame, 9, 0.5 + 0.1 * frame, 1.0) for frame in range(30)))
+    plain, both = (plan_view(RIG, trajectory_of((0, 1, 1.0, 0.0)), table) for table in (None, truth))
+    line = np.rint(plan_map(RIG).pixel(np.stack([np.linspace(0.5, 3.4, 400), np.full(400, 1.0)], -1))).astype(int)
+    dark = both[line[:, 1], line[:, 0]].max(axis=1) < 130
+    assert 0.3 < dark.mean() < 0.8
+    assert not (plain[line[:, 1], line[:, 0]].max(axis=1) < 130).any()
+    dense = trajectory_of(*((frame, 1, 0.5 + 0.1 * frame, 1.0) for frame in range(20)))
+    sparse = dense.copy()
+    sparse["frame"] *= 10
+    pictures = [plan_view(RIG, trajectory_of(), truth) for truth in (dense, sparse)]
+    np.testing.assert_array_equal(pictures[0], pictures[1])
 
 
 @drawn(45, strategies.rigs())
@@ -141,7 +122,19 @@ def test_any_rig_has_a_plan(rig: Rig) -> None:
     assert at(picture, plan.pixel(middle))[:2] != PAPER[:2]
 
 
-def test_names_of_cameras_are_not_on_the_numbers_of_the_axes() -> None:
+@drawn(30, st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), max_size=12))
+def test_labels_stay_on_the_canvas(points: list[tuple[float, float]]) -> None:
+    centres = place_labels(np.array(points).reshape(-1, 2), [(30, 16)] * len(points), (0, 0, 400, 300))
+    assert centres.shape == (len(points), 2)
+    assert (centres >= (15, 8)).all() and (centres <= (385, 292)).all()
+
+
+def test_labels_cover_no_labels_points_or_numbers_of_axes() -> None:
+    points = np.array([[200.0, 150.0], [206.0, 150.0], [200.0, 156.0], [220.0, 135.0]])
+    centres = place_labels(points, [(30, 16)] * 3, (0, 0, 400, 300))
+    distances = np.abs(centres[:, None] - centres[None])
+    assert ((distances[..., 0] >= 30) | (distances[..., 1] >= 16) | np.eye(3, dtype=bool)).all()
+    assert (np.abs(centres - points[3]) >= (15, 8)).any(axis=1).all()
     places = {"a camera in the south": (2.0, -1.2, 2.5), "in the west": (-0.2, 1.0, 2.5)}
     cameras = [looking(name, place, (2.0, 0.5, 1.5), (320, 240), 250.0) for name, place in places.items()]
     nameless = [replace(camera, name=" " * (1 + k)) for k, camera in enumerate(cameras)]
@@ -157,31 +150,13 @@ def test_names_of_cameras_are_not_on_the_numbers_of_the_axes() -> None:
     assert not changed[: round(bottom), : round(left) - 10].any()
 
 
-@drawn(30, st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), max_size=12))
-def test_labels_stay_on_the_canvas(points: list[tuple[float, float]]) -> None:
-    centres = place_labels(np.array(points).reshape(-1, 2), [(30, 16)] * len(points), (0, 0, 400, 300))
-    assert centres.shape == (len(points), 2)
-    assert (centres >= (15, 8)).all() and (centres <= (385, 292)).all()
-
-
-def test_labels_cover_neither_each_other_nor_points() -> None:
-    points = np.array([[200.0, 150.0], [206.0, 150.0], [200.0, 156.0], [220.0, 135.0]])
-    centres = place_labels(points, [(30, 16)] * 3, (0, 0, 400, 300))
-    distances = np.abs(centres[:, None] - centres[None])
-    assert ((distances[..., 0] >= 30) | (distances[..., 1] >= 16) | np.eye(3, dtype=bool)).all()
-    assert (np.abs(centres - points[3]) >= (15, 8)).any(axis=1).all()
-
-
-def test_the_overlay_puts_a_dot_where_the_feet_are() -> None:
+def test_the_overlay_has_feet_and_pillars_as_tall_as_people() -> None:
     camera, people = front_camera(), trajectory_of((4, 3, 1.0, 0.0), (4, 5, 3.0, 1.0))
     picture = overlay(camera, GRID, None, people, 4, width=640)
     assert picture.shape == (480, 640, 3)
     for row in people:
         foot = OverlayView(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)
         assert at(picture, foot) == track_colour(int(row["id"]))
-
-
-def test_a_pillar_is_as_tall_as_its_person() -> None:
     view = OverlayView(front_camera(), 640)
     (body,) = pillar_outline(view, np.array([2.0, 0.0]), 1.8)
     foot, head = (view.pixel(np.array([2.0, 0.0]), z) for z in (0.0, 1.8))
@@ -200,29 +175,22 @@ def test_the_axis_of_a_body_is_inside_its_outline(camera: Camera, height: float)
         assert min(inside) > -1
 
 
-def test_people_behind_the_camera_are_left_out() -> None:
+def test_people_out_of_view_leave_no_trace_and_trails_end() -> None:
     behind = trajectory_of((0, 1, 2.0, -9.0))
     one, other = (overlay(front_camera(), GRID, None, rows, 0) for rows in (behind, behind[:0]))
     np.testing.assert_array_equal(one, other)
-
-
-def test_people_outside_the_picture_leave_no_trace_in_it() -> None:
     camera = front_camera()
     outside = trajectory_of((0, 1, 9.0, 0.0), (1, 1, 9.0, 0.2))
     assert 660 < OverlayView(camera, 640).pixel(np.array([9.0, 0.0]), 0.0)[0] < 1200
     one, other = (overlay(camera, GRID, None, rows, 1, width=640) for rows in (outside, outside[:0]))
     np.testing.assert_array_equal(one, other)
-
-
-def test_a_trail_reaches_back_as_far_as_asked() -> None:
     walk = trajectory_of(*((frame, 1, 0.3 + 0.1 * frame, 0.0) for frame in range(30)))
     now, short = walk[walk["frame"] == 29], walk[walk["frame"] >= 24]
-    camera = front_camera()
     np.testing.assert_array_equal(overlay(camera, GRID, None, walk, 29, 5), overlay(camera, GRID, None, short, 29, 5))
     assert not np.array_equal(overlay(camera, GRID, None, walk, 29, 5), overlay(camera, GRID, None, now, 29, 5))
 
 
-def test_overlays_show_images_masks_or_the_ground() -> None:
+def test_overlays_show_images_masks_boxes_or_the_ground() -> None:
     camera, empty = front_camera(), trajectory_of()
     colour = np.full((240, 320, 3), (10, 200, 100), np.uint8)
     mask = np.zeros((240, 320), np.uint8)
@@ -233,9 +201,6 @@ def test_overlays_show_images_masks_or_the_ground() -> None:
     assert pictures[1][120, 130].min() > pictures[1][20, 300].max() + 40
     assert has(pictures[2], NIGHT) and not np.array_equal(pictures[1], pictures[2])
     np.testing.assert_array_equal(colour, kept)
-
-
-def test_instances_and_boxes_become_masks() -> None:
     instances = np.array([[0, 300], [2, 0]], np.uint16)
     assert backdrop(instances, (2, 2)).tolist() == [[0, 255], [255, 0]]  # type: ignore[union-attr]
     boxes = Boxes(np.array([[1.0, -5.0, 2.0, 7.0]]), np.ones(1))
@@ -243,7 +208,7 @@ def test_instances_and_boxes_become_masks() -> None:
     assert backdrop(None, (4, 3)) is None
 
 
-def test_slices_show_cells_in_their_colours_and_outline_tracks() -> None:
+def test_slices_show_cells_outline_tracks_and_hatch_unseen() -> None:
     log_odds = np.full(GRID.shape, -4.0, np.float16)
     label = np.zeros(GRID.shape, np.int32)
     label[0, 4:6, 1:3] = 6  # great y: the upper left of the first panel
@@ -258,9 +223,6 @@ def test_slices_show_cells_in_their_colours_and_outline_tracks() -> None:
     np.testing.assert_array_equal(outlined.min(axis=0) - top_left, [0, side // 2])
     inner = hot[(hot >= outlined.min(axis=0)).all(axis=1) & (hot <= outlined.max(axis=0)).all(axis=1)]
     assert len(inner) > 0.3 * side**2
-
-
-def test_cells_that_no_view_sees_are_hatched() -> None:
     log_odds = np.full(GRID.shape, np.nan)
     picture = volume_picture(log_odds, np.zeros(GRID.shape, np.int32), GRID)
     even = volume_picture(np.zeros(GRID.shape), np.zeros(GRID.shape, np.int32), GRID)
@@ -270,14 +232,11 @@ def test_cells_that_no_view_sees_are_hatched() -> None:
     assert has(picture, (205, 201, 198)) and has(picture, (236, 234, 232))
 
 
-def test_the_colour_map_diverges() -> None:
+def test_colours_diverge_and_marginals_are_the_greatest() -> None:
     cold, middle, hot, infinite = colours_of(np.array([-2.0, 0.0, 2.0, np.inf]), 2.0).astype(int)
     assert cold[0] > cold[2] + 40 and hot[2] > hot[0] + 40
     assert np.ptp(middle) == 0 and middle[0] > 240
     np.testing.assert_array_equal(hot, infinite)
-
-
-def test_the_marginal_is_the_greatest_of_the_visible_planes() -> None:
     log_odds = np.full(GRID.shape, -3.0)
     log_odds[1, 0, 0], log_odds[0, 0, 0] = 3.0, np.nan
     flat = log_odds.copy()
@@ -289,7 +248,7 @@ def test_the_marginal_is_the_greatest_of_the_visible_planes() -> None:
     assert has(marginal_picture(log_odds, label, GRID), track_colour(2))
 
 
-def test_time_rises() -> None:
+def test_time_rises_and_the_nearer_thread_is_in_front() -> None:
     walk = trajectory_of(*((frame, 1, 2.0, 0.5) for frame in range(20)))
     picture = spacetime_picture(GRID, walk, 5.0, width=600, height=700)
     block = Block.fit(GRID, 0, 19, (600, 700))
@@ -297,9 +256,6 @@ def test_time_rises() -> None:
     assert picture.shape == (700, 600, 3)
     assert end[1] < start[1] - 100 and abs(end[0] - start[0]) < 1e-6
     assert at(picture, start) == at(picture, end) == track_colour(1)
-
-
-def test_the_nearer_thread_passes_in_front() -> None:
     front = [(frame, 1, 0.5 + 0.15 * frame, 0.0) for frame in range(21)]
     far = [(frame, 2, 3.5 - 0.15 * frame, 1.0) for frame in range(21)]
     picture = spacetime_picture(GRID, trajectory_of(*front, *far), 5.0, width=600, height=700)

@@ -36,7 +36,6 @@ from stseg.view_health.run_warnings import body_warnings, view_warnings
 
 
 def page_of(run: Path, output: Path, **options: Any) -> str:
-    """The page that a report writes."""
     report(run, output=output, **options)
     return output.read_text("utf-8")
 
@@ -54,7 +53,7 @@ def decoded(png: bytes) -> Bytes:
     return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), np.uint8)
 
 
-def test_the_page_holds_everything_and_loads_nothing(run_path: Path, tmp_path: Path) -> None:
+def test_the_page_holds_everything_and_opens_no_stream(run_path: Path, tmp_path: Path) -> None:
     page = page_of(run_path, tmp_path / "page.html")
     assert page == page_of(run_path, tmp_path / "again.html")
     words = re.sub(r"data:image/png;base64,[^\"]+", "", page)
@@ -65,6 +64,10 @@ def test_the_page_holds_everything_and_loads_nothing(run_path: Path, tmp_path: P
         assert fact in page
     empty = run_files.write_empty_run(tmp_path / "empty.h5")
     assert "<title>hall</title>" in page_of(empty, tmp_path / "empty.html")
+    run_path.with_name("left.avi").unlink()
+    report(run_path, output=tmp_path / "a.html", frame=(11,))
+    refused(SourceError, "left", report, run_path, output=tmp_path / "b.html", camera_images=True)
+    assert not (tmp_path / "b.html").exists()
 
 
 def test_an_encounter_is_one_line_and_says_how_long_it_was(tmp_path: Path) -> None:
@@ -118,7 +121,6 @@ def vivid_sources(folder: Path, rows: int, columns: int) -> tuple[CameraSource, 
 
 @pytest.fixture
 def filmed_run(tmp_path: Path) -> Path:
-    """A run with camera images of one vivid colour."""
     sources = vivid_sources(tmp_path / "frames", 12, 16)
     recording = replace(run_files.small_recording(tmp_path), sources=sources)
     return run_files.write_small_run(tmp_path / "filmed.h5", recording=recording)
@@ -136,13 +138,6 @@ def test_camera_pixels_are_shown_only_when_asked_for(filmed_run: Path, tmp_path:
     assert found == [[False, False], [True, True]]
 
 
-def test_without_the_flag_no_stream_is_even_opened(run_path: Path, tmp_path: Path) -> None:
-    run_path.with_name("left.avi").unlink()
-    report(run_path, output=tmp_path / "a.html", frame=(11,))
-    refused(SourceError, "left", report, run_path, output=tmp_path / "b.html", camera_images=True)
-    assert not (tmp_path / "b.html").exists()
-
-
 def test_pictures_stand_beside_the_page(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     report(run_path, output=tmp_path / "a.html", pictures=tmp_path / "one", frame=(11,))
     maps = {"plan", "spacetime", "density", "dwell", "flow", "ghosts", "blind"}
@@ -158,15 +153,12 @@ def test_pictures_stand_beside_the_page(run_path: Path, tmp_path: Path, capsys: 
     assert older.read_bytes() == (tmp_path / "one" / "plan.png").read_bytes()
 
 
-def test_truth_adds_scores_of_the_run_s_frames(run_path: Path, tmp_path: Path) -> None:
+def test_truth_adds_scores_and_errors_are_reported(run_path: Path, tmp_path: Path) -> None:
     rows = [f"{row['frame']},{row['id']},{row['x']},{row['y']}" for row in run_files.small_trajectory()]
     truth = tmp_path / "truth.csv"
     truth.write_text("\n".join(["frame,id,x,y", "3,1,0.1,0.1", *rows, "900,1,0.1,0.1"]))
-    page = page_of(run_path, tmp_path / "a.html", truth=truth, frame=(11,))
+    page = page_of(run_path, tmp_path / "truth.html", truth=truth, frame=(11,))
     assert "<dt>IDF1</dt><dd>100.0 %</dd>" in page
-
-
-def test_errors_of_the_user_are_reported(run_path: Path, tmp_path: Path) -> None:
     refused(ConfigError, r"--frame.*found 99.*10 to 15", report, run_path, output=tmp_path / "a.html", frame=(99,))
     (tmp_path / "old.html").write_text("old, made by stseg")
     assert not page_of(run_path, tmp_path / "old.html", overwrite=True, frame=(11,)).startswith("old")
@@ -221,23 +213,12 @@ def test_a_view_that_is_wrong_is_named(nats: AnyArray, words: str) -> None:
     assert words in warning
 
 
-def test_views_without_a_fault_cause_no_warning() -> None:
+def test_wide_and_torn_bodies_are_reported_and_no_sound_views() -> None:
     """Views that agree, frames without people, and little evidence of people who are hidden now and then."""
     noise = np.random.default_rng(1).normal(3, 1, (2, len(FRAMES)))
     hidden = np.where(FRAMES % 3 == 0, 2.5, -0.016)
     for people in (people_in(FRAMES, *noise), people_in(FRAMES[FRAMES < 200], 3, 3), people_in(FRAMES, 3, hidden)):
         assert view_warnings(("a", "b"), people, FRAMES, 5.0) == []
-
-
-def bodies_of(height: float, width: float, number: int = 40) -> Rows:
-    return run_files.table_of(TRAJECTORY, height=np.full(number, height), width=width)
-
-
-def rates_of(*miss: float) -> Rows:
-    return run_files.table_of(RATES, view=np.arange(len(miss)), miss=miss)
-
-
-def test_wide_and_torn_bodies_are_reported() -> None:
     calm = rates_of(0.1, 0.1)
     assert body_warnings(("a", "b"), bodies_of(1.7, 0.5), calm, BodyConfig()) == []
     assert body_warnings(("a", "b"), bodies_of(1.7, 0.9, number=5), calm, BodyConfig()) == []
@@ -246,6 +227,14 @@ def test_wide_and_torn_bodies_are_reported() -> None:
     assert body_warnings(("a", "b"), bodies_of(1.7, 0.62), calm, BodyConfig(width_mean=0.6)) == []
     (warning,) = body_warnings(("a", "b"), bodies_of(1.7, 0.42), rates_of(0.15, 0.38), BodyConfig())
     assert warning.startswith("view b misses 38 %")
+
+
+def bodies_of(height: float, width: float, number: int = 40) -> Rows:
+    return run_files.table_of(TRAJECTORY, height=np.full(number, height), width=width)
+
+
+def rates_of(*miss: float) -> Rows:
+    return run_files.table_of(RATES, view=np.arange(len(miss)), miss=miss)
 
 
 def front_camera(name: str, x: float) -> Camera:
@@ -261,7 +250,6 @@ def recording(tmp_path: Path) -> Recording:
 
 
 def walk() -> Rows:
-    """One person who crosses the ground in frames 10 to 15."""
     return run_files.table_of(TRAJECTORY, frame=run_files.FRAMES, id=1, x=np.linspace(1.4, 2.6, 6), y=0.5, height=1.7)
 
 
@@ -279,7 +267,7 @@ def is_close(pixel: Bytes, colour: tuple[int, int, int], tolerance: float) -> bo
     return bool(np.abs(pixel.astype(int) - colour).max() <= tolerance)
 
 
-def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -> None:
+def test_films_show_pillars_and_the_plan_of_one_or_many_cameras(recording: Recording) -> None:
     rig = recording.rig
     film = RunFilm(rig, np.full(rig.grid.shape, 2, np.uint8), walk())
     pictures = [film.picture(frame, (None, None)) for frame in (10, 15)]
@@ -292,6 +280,11 @@ def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -
     plans = [picture[480:] for picture in pictures]  # below the views: beside them, a screen would show all smaller
     assert film.size[0] == 1280 and (plans[1] == track_colour(1)).all(axis=-1).any()
     assert not np.array_equal(plans[0], plans[1])
+    for count, width in ((1, 1680), (7, 1998)):  # the plan is beside the views
+        cameras = tuple(replace(front_camera("c", 2), name=f"c{k}") for k in range(count))
+        rig = replace(recording.rig, cameras=cameras)
+        film = RunFilm(rig, np.zeros(rig.grid.shape, np.uint8), walk()[:0])
+        assert film.picture(3, (None,) * count).shape == (film.size[1], width, 3)
 
 
 def test_the_film_has_the_frames_that_were_asked_for(walk_path: Path, tmp_path: Path, stdout: Command) -> None:
@@ -308,6 +301,15 @@ def test_the_film_has_the_frames_that_were_asked_for(walk_path: Path, tmp_path: 
     assert len(frames_of(tmp_path / "a.mp4")) == 1
 
 
+@cases()
+def test_slips_are_told_before_any_work(
+    walk_path: Path, monkeypatch: pytest.MonkeyPatch, refusal: Command, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(walk_path.parent)
+    before = set(walk_path.parent.iterdir())
+    assert message in refusal("report", walk_path, *arguments) and set(walk_path.parent.iterdir()) == before
+
+
 def test_without_the_flag_a_film_holds_no_camera_pixel(walk_path: Path, tmp_path: Path) -> None:
     for path in (tmp_path / "frames").iterdir():
         path.unlink()
@@ -318,28 +320,11 @@ def test_without_the_flag_a_film_holds_no_camera_pixel(walk_path: Path, tmp_path
     assert not (tmp_path / "b.mp4").exists()
 
 
-@cases()
-def test_slips_are_told_before_any_work(
-    walk_path: Path, monkeypatch: pytest.MonkeyPatch, refusal: Command, arguments: list[str], message: str
-) -> None:
-    monkeypatch.chdir(walk_path.parent)
-    before = set(walk_path.parent.iterdir())
-    assert message in refusal("report", walk_path, *arguments) and set(walk_path.parent.iterdir()) == before
-
-
 def test_what_goes_wrong_on_the_way_leaves_no_film(tmp_path: Path) -> None:
     broken = Mock(side_effect=OutputError("x", "", "trouble", "none"))
     refused(OutputError, "trouble", write_film, tmp_path / "a.mp4", (broken(k) for k in range(1)), 5.0, False)
     refused(OutputError, "empty", write_film, tmp_path / "a.mp4", [], 5.0, False)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_rig_of_one_camera_and_of_many_have_films(recording: Recording) -> None:
-    for count, width in ((1, 1680), (7, 1998)):  # the plan is beside the views
-        cameras = tuple(replace(front_camera("c", 2), name=f"c{k}") for k in range(count))
-        rig = replace(recording.rig, cameras=cameras)
-        film = RunFilm(rig, np.zeros(rig.grid.shape, np.uint8), walk()[:0])
-        assert film.picture(3, (None,) * count).shape == (film.size[1], width, 3)
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")

@@ -48,16 +48,6 @@ def viewers(spec: SceneSpec) -> list[Viewer]:
     return SceneFilm(spec).viewers
 
 
-def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
-    dressed = [clothing(5, person, 3) for person in (1, 2, 3, 4)]
-    clothes = [own_clothing(5, person) for person in (1, 2, 3, 4)]
-    np.testing.assert_array_equal(dressed[0], clothes[0])
-    np.testing.assert_array_equal(dressed[3], clothes[3])
-    for k in (1, 2):
-        np.testing.assert_allclose((dressed[k] - clothes[0])[:, :6], 0.2 * (clothes[k] - clothes[0])[:, :6])
-        np.testing.assert_array_equal(dressed[k][:, 6:], clothes[0][:, 6:])
-
-
 @cases()
 def test_scene_refuses_what_cannot_be(key: str, value: object) -> None:
     with pytest.raises(ConfigError, match=f"scene tiny: {key}"):
@@ -77,13 +67,17 @@ def test_cameras_stand_where_the_scene_says_and_see_the_area(name: str) -> None:
         assert np.mean(ahead & camera.inside(pixel)) > 0.9
 
 
-def test_half_the_cameras_are_among_the_whole() -> None:
+def test_half_the_cameras_are_of_the_whole_and_places_too() -> None:
     few, many = build_rig(NAMED["dense4"]).cameras, build_rig(NAMED["dense"]).cameras
     for camera, twin in zip(few, many[::2], strict=True):
         np.testing.assert_array_equal(camera.projection, twin.projection)
     spec = replace(TINY, cameras=4, people=1)
     whole, half = (next(SceneFilm(s).frame_sets()) for s in (spec, replace(spec, cameras=2)))
     np.testing.assert_array_equal(whole.views[2].image, half.views[1].image)
+    spec = replace(TINY, cameras=1, noise=9.0, size=(32, 24))
+    for one, other in zip(walk_freely(TINY), walk_freely(spec), strict=True):
+        for field in fields(CrowdFrame):
+            np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
 
 
 @drawn(15, camera=cameras(size=(80, 60)), depth=st.floats(0.5, 20.0))
@@ -110,7 +104,7 @@ def test_bodies_stand_on_the_ground_as_tall_as_they_are(phase: float, swing: flo
     assert (np.abs(high - [1.55, 1.9]) < drop).all()
 
 
-def test_limbs_swing_with_the_gait_and_come_back() -> None:
+def test_limbs_swing_and_clothes_are_of_people_in_own_tones() -> None:
     viewer = viewers(replace(TINY, size=(160, 120)))[0]
     here = np.array([[0.0, 0.0]])
     masks = {
@@ -122,13 +116,17 @@ def test_limbs_swing_with_the_gait_and_come_back() -> None:
     assert (masks[0.0, 1.0] ^ masks[np.pi / 2, 1.0]).sum() > 0.15 * body
     assert (masks[0.0, 1.0] ^ masks[2 * np.pi, 1.0]).sum() <= 1
     assert (masks[0.0, 0.0] ^ masks[np.pi / 2, 0.0]).sum() == 0
-
-
-def test_clothes_belong_to_a_person() -> None:
     np.testing.assert_array_equal(own_clothing(5, 3), own_clothing.__wrapped__(5, 3))
     assert not np.array_equal(own_clothing(5, 3), own_clothing(5, 4))
     assert not np.array_equal(own_clothing(5, 3), own_clothing(6, 3))
     assert own_clothing(5, 3).shape[0] == len(PARTS)
+    dressed = [clothing(5, person, 3) for person in (1, 2, 3, 4)]
+    clothes = [own_clothing(5, person) for person in (1, 2, 3, 4)]
+    np.testing.assert_array_equal(dressed[0], clothes[0])
+    np.testing.assert_array_equal(dressed[3], clothes[3])
+    for k in (1, 2):
+        np.testing.assert_allclose((dressed[k] - clothes[0])[:, :6], 0.2 * (clothes[k] - clothes[0])[:, :6])
+        np.testing.assert_array_equal(dressed[k][:, 6:], clothes[0][:, 6:])
 
 
 @drawn(
@@ -170,6 +168,15 @@ def test_shadows_darken_the_ground_and_nothing_else() -> None:
         before, after = viewer.room.image[ground].astype(float), drawing.light[ground].astype(float)
         assert (after <= before).all()
         assert (after / np.maximum(before, 1)).min() == pytest.approx(1 - strength, abs=0.02)
+
+
+def test_animals_have_their_length_in_the_direction_they_face() -> None:
+    crowd = crowd_of(np.zeros((1, 2)), heading=0.4)
+    bodies = upright_cylinders(crowd, 0.35, 1.1)
+    ahead, across = np.array([np.cos(0.4), np.sin(0.4), 0.0]), np.array([-np.sin(0.4), np.cos(0.4), 0.0])
+    for direction, half in ((ahead, 0.55), (across, 0.175)):
+        reach = np.sqrt(((bodies.axes[0] @ direction) ** 2).sum(-1))
+        assert reach.max() == pytest.approx(half)
 
 
 def as_it_is(kernel: Any) -> Any:
@@ -231,7 +238,7 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
 
 
 @compiled_only
-def test_regulars_come_back_as_they_were() -> None:
+def test_regulars_come_back_and_nobody_leaves_closed_rooms() -> None:
     spec = replace(NAMED["return"], seconds=NAMED["return"].seconds / 2)
     came, heights, before = Counter[int](), set[tuple[int, float]](), set[int]()
     for crowd in walk_freely(spec):
@@ -240,19 +247,8 @@ def test_regulars_come_back_as_they_were() -> None:
         before = set(crowd.id.tolist())
     assert set(came) == set(range(1, spec.people + 1)) and min(came.values()) >= 3
     assert len(heights) == spec.people
-
-
-@compiled_only
-def test_nobody_leaves_the_closed_room() -> None:
     spec = replace(NAMED["long"], seconds=120.0)
     assert all(len(crowd.truth(spec.area)) == spec.people for crowd in walk_freely(spec))
-
-
-def test_places_do_not_depend_on_the_views() -> None:
-    spec = replace(TINY, cameras=1, noise=9.0, size=(32, 24))
-    for one, other in zip(walk_freely(TINY), walk_freely(spec), strict=True):
-        for field in fields(CrowdFrame):
-            np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
 
 
 def test_equal_scenes_are_equal_and_seeds_matter() -> None:
@@ -268,7 +264,7 @@ def test_equal_scenes_are_equal_and_seeds_matter() -> None:
             assert not np.array_equal(view.image, else_view.image)
 
 
-def test_where_nobody_stands_frames_are_those_of_the_empty_room() -> None:
+def test_empty_frames_noise_and_light_are_as_asked_for() -> None:
     film = SceneFilm(NOISELESS)
     empty = next(film.empty())
     moment = next(film.frame_sets())
@@ -276,6 +272,11 @@ def test_where_nobody_stands_frames_are_those_of_the_empty_room() -> None:
         close = cv2.dilate((view.instances > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0  # the lens is soft
         np.testing.assert_array_equal(view.image[~close], image[~close])
         assert (view.image[view.instances > 0] != image[view.instances > 0]).mean() > 0.5
+    noise = images(noise=6.0)[0] - images()[0]
+    assert np.std(noise) == pytest.approx(6.0, rel=0.05) and abs(np.mean(noise)) < 0.3
+    means = images(light_drift=0.2, light_period=1.0).mean((2, 3, 4))
+    swing = (means.max(axis=0) - means.min(axis=0)) / means.mean(axis=0) / 2
+    np.testing.assert_allclose(swing, 0.2, atol=0.02)
 
 
 def images(**settings: object) -> Floats:
@@ -284,15 +285,7 @@ def images(**settings: object) -> Floats:
     return np.array([[view.image for view in frame.views] for frame in SceneFilm(spec).frame_sets()], float)
 
 
-def test_noise_and_light_are_as_large_as_asked_for() -> None:
-    noise = images(noise=6.0)[0] - images()[0]
-    assert np.std(noise) == pytest.approx(6.0, rel=0.05) and abs(np.mean(noise)) < 0.3
-    means = images(light_drift=0.2, light_period=1.0).mean((2, 3, 4))
-    swing = (means.max(axis=0) - means.min(axis=0)) / means.mean(axis=0) / 2
-    np.testing.assert_allclose(swing, 0.2, atol=0.02)
-
-
-def test_lamps_are_switched_and_light_what_is_near() -> None:
+def test_lamps_and_clouds_light_what_is_near_and_people() -> None:
     lit = images(lamps=(Lamp(1.5, on=0.3, off=0.6, place=(0.0, 0.0, 1.0), reach=1.0),))[:, 0]
     far = np.hypot(*np.nan_to_num(viewers(NOISELESS)[0].room.ground, nan=99.0).transpose(2, 0, 1))
     for frame in (2, 6, 9):
@@ -300,17 +293,11 @@ def test_lamps_are_switched_and_light_what_is_near() -> None:
     gain = lit[3] / np.maximum(lit[0], 1)
     assert np.median(gain[far < 0.5]) == pytest.approx(1.72, abs=0.05)  # half of 1.5 a metre below it
     assert gain[far < 0.5].min() > 1.5 > 1.15 > np.median(gain[(far > 2.5) & (far < 99)])
-
-
-def test_a_cloud_comes_slowly_and_is_everywhere() -> None:
     means = images(lamps=(Lamp(-0.5, on=0.2, rise=0.4),))[:, 1].mean((1, 2, 3))
     np.testing.assert_allclose(means[[0, 2, 4, 6, 9]] / means[0], [1, 1, 0.75, 0.5, 0.5], atol=0.02)
-
-
-def test_people_stand_in_the_light_of_lamps() -> None:
     spec = replace(NOISELESS, seconds=0.1, size=(160, 120))
-    lit = replace(spec, lamps=(Lamp(0.4, on=0.0, place=(0.0, 0.0, 2.0), reach=2.0),))
-    dark, bright = (next(SceneFilm(one).frame_sets()).views[0] for one in (spec, lit))
+    lamp = replace(spec, lamps=(Lamp(0.4, on=0.0, place=(0.0, 0.0, 2.0), reach=2.0),))
+    dark, bright = (next(SceneFilm(one).frame_sets()).views[0] for one in (spec, lamp))
     person = np.asarray(dark.instances > 0)
     assert person.any()
     np.testing.assert_array_equal(dark.instances, bright.instances)
@@ -340,21 +327,15 @@ def _detections(share: float, rounds: int) -> tuple[int, list[Floats]]:
     return len(found), found
 
 
-def test_detector_misses_the_hidden_and_shakes() -> None:
+def test_detectors_miss_shake_guess_and_see_ghosts() -> None:
     full, boxes = _detections(1.0, 300)
     half, little = (_detections(share, 300)[0] for share in (0.4, 0.1))
     assert full > 0.93 * 300 > half > 0.3 * 300 > little and little < 0.1 * 300
     np.testing.assert_allclose(np.mean(boxes, axis=0), [99.5, 79.5, 40, 100], atol=0.8)
     assert 1.0 < np.std(boxes, axis=0)[3] < 8.0
-
-
-def test_detector_guesses_whole_bodies_sometimes() -> None:
     _, boxes = _detections(0.6, 200)
     tall = np.array(boxes)[:, 3] > 80
     assert 0.3 < tall.mean() < 0.9
-
-
-def test_detector_sees_ghosts_now_and_then() -> None:
     nobody, focus = np.zeros((0, 5), np.int64), np.array([1.5, 1.5])
     counts = [len(detect(CAMERA, nobody, nobody, focus, np.random.default_rng(k))) for k in range(400)]
     assert 0.02 < np.mean(counts) < 0.2
@@ -424,21 +405,9 @@ def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: pytest.Captur
             np.testing.assert_array_equal(view.boxes.pixel, whole.boxes.pixel)
 
 
-def test_command_suggests_a_scene(tmp_path: Path) -> None:
+def test_the_command_suggests_scenes_and_says_animals(tmp_path: Path) -> None:
     refused(ConfigError, "did you mean dense", simulate, tmp_path, scene="dence")
     refused(ConfigError, "--size", simulate, tmp_path, scene="tiny", size="40x30")
-
-
-def test_animals_have_their_length_in_the_direction_they_face() -> None:
-    crowd = crowd_of(np.zeros((1, 2)), heading=0.4)
-    bodies = upright_cylinders(crowd, 0.35, 1.1)
-    ahead, across = np.array([np.cos(0.4), np.sin(0.4), 0.0]), np.array([-np.sin(0.4), np.cos(0.4), 0.0])
-    for direction, half in ((ahead, 0.55), (across, 0.175)):
-        reach = np.sqrt(((bodies.axes[0] @ direction) ** 2).sum(-1))
-        assert reach.max() == pytest.approx(half)
-
-
-def test_the_rig_says_what_animals_are(tmp_path: Path) -> None:
     simulate(tmp_path / "a", scene="animals", seconds=0.06, size="64,48")
     simulate(tmp_path / "b", scene="tiny", seconds=0.1)
     body = read_recording(tmp_path / "a" / "rig_masks.toml").body

@@ -36,39 +36,30 @@ def test_errors_repeat_for_a_frame_and_vanish_at_strength_zero(kind: str) -> Non
         np.testing.assert_array_equal(spoiled(kind, 0.0), MASK)
 
 
-def test_silhouettes_grow_and_shrink_by_a_share_of_a_bodys_width() -> None:
-    row = MASK[60, 30:80] > 0
-    wider, narrower = spoiled("dilation", 0.3)[60, 30:80] > 0, spoiled("erosion", 0.3)[60, 30:80] > 0
-    assert (wider.sum() - row.sum(), row.sum() - narrower.sum()) == (6, 6)
-
-
-def test_holes_take_their_share_and_legs_are_cut() -> None:
-    assert (spoiled("holes", 0.25) > 0).sum() == pytest.approx(0.75 * (MASK > 0).sum(), rel=0.02)
-    cut = spoiled("legs", 0.2)
-    assert not cut[78:90, 40:60].any() and cut[30:78, 40:60].all()
-
-
-def test_foreground_without_people_is_added() -> None:
+def test_foreground_is_added_and_people_flicker() -> None:
     for kind in ("shadows", "staying", "rain"):
         added = spoiled(kind, STRENGTHS[kind][2])
         assert (added >= MASK).all() and (added > MASK).any()
     np.testing.assert_array_equal(spoiled("staying", 4, replace(MOMENT, frame=0)), MASK)
     np.testing.assert_array_equal(spoiled("staying", 4), spoiled("staying", 4, replace(MOMENT, frame=300)))
-
-
-def test_people_flicker_for_half_a_second_each() -> None:
     gone = [not spoiled("flicker", 0.3, replace(MOMENT, frame=frame))[60, 50] for frame in range(1000)]
     blinks = np.array(gone).reshape(-1, 5)
     assert (blinks.all(1) | ~blinks.any(1)).all() and blinks.any(1).mean() == pytest.approx(0.3, abs=0.1)
 
 
-def test_boxes_jitter_go_missing_and_double() -> None:
+def test_boxes_jitter_and_silhouettes_grow_and_lose_parts() -> None:
     jittered = spoiled_boxes(BOXES, [Spoil("jitter", 0.1)], MOMENT).pixel
     assert (jittered[:, 0] - 10).std() == pytest.approx(3.0, rel=0.2)
     assert (jittered[:, 1] - 20).std() == pytest.approx(9.0, rel=0.2)
     assert len(spoiled_boxes(BOXES, [Spoil("missed", 0.2)], MOMENT)) == pytest.approx(320, abs=30)
     assert len(spoiled_boxes(BOXES, [Spoil("doubled", 0.2)], MOMENT)) == pytest.approx(480, abs=30)
     assert set(BOX_KINDS) | set(MASK_KINDS) == set(STRENGTHS) == set(MAX_STRENGTHS)
+    row = MASK[60, 30:80] > 0
+    wider, narrower = spoiled("dilation", 0.3)[60, 30:80] > 0, spoiled("erosion", 0.3)[60, 30:80] > 0
+    assert (wider.sum() - row.sum(), row.sum() - narrower.sum()) == (6, 6)
+    assert (spoiled("holes", 0.25) > 0).sum() == pytest.approx(0.75 * (MASK > 0).sum(), rel=0.02)
+    cut = spoiled("legs", 0.2)
+    assert not cut[78:90, 40:60].any() and cut[30:78, 40:60].all()
 
 
 def test_a_spoiled_film_keeps_all_but_masks_and_boxes() -> None:

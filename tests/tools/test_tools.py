@@ -25,10 +25,14 @@ from experiments import ablation  # noqa: E402
 from result_sets import SETS, VARIANTS  # noqa: E402
 
 
-def test_cmc_counts_frames_from_one(tmp_path: Path) -> None:
+def test_cmc_counts_from_one_and_wildtrack_has_all_boxes(tmp_path: Path) -> None:
     path = tmp_path / "truth.txt"
     path.write_text("1 4 -1 -1 -1 -1 -1 2.5 0.5 0.8 0.5 0.5 0.8\n\n3 5 -1 -1 -1 -1 -1 -1 2 0.8 0.5 0.5 0.8\n")
     assert datasets.cmc_truth(path).tolist() == [(0, 4, 2.5, 0.5, 0), (2, 5, -1.0, 2.0, 0)]
+    datasets.wildtrack_annotated_boxes(data_path("wildtrack/annotations_positions"), tmp_path)
+    for name in datasets.WILDTRACK_VIEWS:
+        boxes = np.loadtxt(tmp_path / f"{name}.csv", delimiter=",", skiprows=1)
+        assert len(np.unique(boxes[:, 0])) > 190 and (boxes[:, 3:] > 0).all()
 
 
 def test_wildtrack_cells_become_metres_and_unseen_boxes_nothing(tmp_path: Path) -> None:
@@ -57,22 +61,12 @@ def test_the_truth_of_wildtrack_is_its_own_perfect_track() -> None:
     assert evaluate(truth, truth, 0.3).hota == pytest.approx(100)
 
 
-def test_wildtrack_has_boxes_in_every_view(tmp_path: Path) -> None:
-    datasets.wildtrack_annotated_boxes(data_path("wildtrack/annotations_positions"), tmp_path)
-    for name in datasets.WILDTRACK_VIEWS:
-        boxes = np.loadtxt(tmp_path / f"{name}.csv", delimiter=",", skiprows=1)
-        assert len(np.unique(boxes[:, 0])) > 190 and (boxes[:, 3:] > 0).all()
-
-
-def test_the_page_shows_trackers_side_by_side() -> None:
+def test_the_page_shows_trackers_and_the_stored_rows() -> None:
     row = {"frames": "0:136", "MODA": "99.6", "IDF1": "98.04", "error_m": "0.03", "switches": "0"}
     text = "above\n<!-- table -->\nold\n<!-- end of table -->\nbelow\n"
     shown = results.page(text, {("uu4", "cut"): row, ("uu4", "kalman"): row | {"MODA": ""}})
     assert "| 0:136 | 99.6 / 98.0 | 0 | 0.03 | - | - | - | - |" in shown and "old" not in shown
     assert shown.startswith("above\n") and shown.endswith("below\n")
-
-
-def test_the_committed_page_shows_the_stored_rows() -> None:
     text = results.PAGE.read_text(encoding="utf-8")
     assert results.ablation(results.page(text, results.stored())) == text
 
