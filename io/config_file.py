@@ -137,7 +137,7 @@ def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
     for name, entry in given.items():
         key = _join(table, name)
         if name not in hints:
-            raise ConfigError(_place(entry, place), key, "an unknown key", one_of(name, hints))
+            raise ConfigError(_place(entry, place), key or "''", "an unknown key", one_of(name, hints))
         values[name] = _built(hints[name], entry, place, key)
     try:
         return kind(**values)

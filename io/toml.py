@@ -40,7 +40,7 @@ class Table:
 
     def key(self, name: str) -> str:
         """The key's full name."""
-        return f"{self.place}.{name}" if self.place else name
+        return f"{self.place}.{name}" if self.place else name or "''"
 
     def error(self, name: str, found: object, expected: str) -> InputError:
         """An error at the key `name`."""

@@ -107,5 +107,4 @@ def _one(target: Target, path: Path, data: bytes, valid: bytes | None = None) ->
             print(os.environ.get("PYTEST_CURRENT_TEST"), bool(found), file=file)
     assert valid is not None or not found, found
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-    if held > MEBI:
-        raise AssertionError(f"{held} MiB of memory")
+    assert held <= MEBI, f"{held} MiB of memory"
