@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stseg.arrays import Bytes
 from stseg.errors import CalibrationError
 from stseg.geometry.camera import Camera
 from stseg.geometry.fits import homogeneous
@@ -116,13 +114,6 @@ class Rig:
             raise CalibrationError("projections", "", found, "(view, 3, 4)")
         ground, vertical = matrix[:, :, [0, 1, 3]], matrix[:, :, 2]
         return cls.from_homographies(ground, vertical, sizes, grid, frame_rate, names=names, name=name)
-
-    @cached_property
-    def most_views(self) -> Bytes:
-        """Number of views that see the cell above each ground cell that most of them see, uint8 (y, x)."""
-        ground, heights = self.grid.ground, self.grid.heights
-        views = [np.sum([camera.sees(ground, height) for camera in self.cameras], 0) for height in heights]
-        return np.asarray(np.max(views, 0) * self.grid.inside(), np.uint8)
 
     def reduced(self, factors: Sequence[int]) -> Rig:
         """The rig with each camera's images reduced by a whole factor."""

@@ -29,7 +29,7 @@ from stseg.segmentation.cut_energy import build_energy
 from stseg.segmentation.label_energy import BodyShape
 from stseg.segmentation.patches import GroundPatches, mark_places, people_squares
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
-from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows, views_at
+from stseg.trackers.rows import TrackPlaces, event_rows, fill_views, trajectory_rows
 from stseg.trackers.window_existence import TrackedFrame, WindowExistence
 from stseg.tracking.filter.prediction import earlier_detections, predicted_places, together
 from stseg.tracking.filter.track_filter import TrackFilter
@@ -197,17 +197,23 @@ class CutTracker:
             cell = plane * (shape[1] * shape[2]) + place
             labels.append(SparseLabels(shape, cell, identity[blobs[k].cells.reshape(-1)[place]]))
             rows.append(self._rows(frames[k].fused, blobs[k], decision.identity[k]))
-        return Commit([frames[k].fused for k in kept], labels, np.concatenate(rows), event_rows(decision.events), row)
+        trajectory = np.concatenate(rows)
+        fill_views(trajectory, self.rig)
+        return Commit([frames[k].fused for k in kept], labels, trajectory, event_rows(decision.events), row)
 
     def _rows(self, fused: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:
         """TRAJECTORY rows of the detections that the blobs of identities hold."""
         named, people = np.flatnonzero(identity), fused.people
         detected, (tall, wide) = blobs.person[named], people.sizes.measured(self.config.body)
-        ground, covariance = people.ground[detected], people.covariance[detected]
         tracks = TrackPlaces(
-            identity[named], ground, covariance, tall[detected], wide[detected], people.evidence[detected]
+            identity[named],
+            people.ground[detected],
+            people.covariance[detected],
+            tall[detected],
+            wide[detected],
+            people.evidence[detected],
         )
-        return trajectory_rows(fused.frame, tracks, blobs.extent[named], views_at(self.rig, ground))
+        return trajectory_rows(fused.frame, tracks, blobs.extent[named])
 
 
 def _done(solution: Callable[[], Commit]) -> Future[Commit]:

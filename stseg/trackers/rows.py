@@ -29,11 +29,10 @@ class TrackPlaces(NamedTuple):
     """float64 (n,): nats."""
 
 
-def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats, views: Ints) -> Rows:
-    """TRAJECTORY rows of one frame, sorted by id.
+def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats) -> Rows:
+    """TRAJECTORY rows of one frame, sorted by id, without views (`fill_views`).
 
-    `extent` float64 (n,) is the ground area of each track, square metres, `views` int64 (n,) the number of views that
-    see the place.
+    `extent` float64 (n,) is the ground area of each track, square metres.
     """
     ids, ground, covariance, height, width, score = tracks
     rows = np.zeros(len(ids), TRAJECTORY)
@@ -42,15 +41,17 @@ def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats, views: Ints
     rows["raw_x"], rows["raw_y"] = ground[:, 0], ground[:, 1]
     rows["xx"], rows["xy"], rows["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
     rows["height"], rows["width"] = height, width
-    rows["extent"], rows["score"], rows["views"] = extent, score, views
+    rows["extent"], rows["score"] = extent, score
     return rows[np.argsort(ids, kind="stable")]
 
 
-def views_at(rig: Rig, ground: Floats) -> Ints:
-    """Number of views that see some plane above each place (n, 2), int64 (n,)."""
-    cell, most = np.rint(rig.grid.cell_of(ground)).astype(int), rig.most_views
-    column, row = cell[:, 0].clip(0, most.shape[1] - 1), cell[:, 1].clip(0, most.shape[0] - 1)
-    return np.asarray(most[row, column], np.int64)
+def fill_views(rows: Rows, rig: Rig) -> None:
+    """Fill the numbers of views that see the cell above each place, of the plane at which most of them see it."""
+    grid, cell = rig.grid, np.rint(rig.grid.cell_of(np.column_stack([rows["x"], rows["y"]]))).astype(int)
+    column, row = cell[:, 0].clip(0, grid.shape[2] - 1), cell[:, 1].clip(0, grid.shape[1] - 1)
+    place = np.column_stack([grid.ground_x[column], grid.ground_y[row]])
+    views = [np.sum([camera.sees(place, height) for camera in rig.cameras], 0) for height in grid.heights]
+    rows["views"] = np.max(views, 0) * grid.contains(place)
 
 
 def event_rows(events: list[Event]) -> Rows:

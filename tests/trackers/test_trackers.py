@@ -15,9 +15,9 @@ from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.graphcut.grid_energy import QUANTUM
 from stseg.records.sparse_volume import SparseVolume
-from stseg.records.tables import WINDOW
+from stseg.records.tables import TRAJECTORY, WINDOW
 from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, TrackingMethod, find_tracker
-from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows, views_at
+from stseg.trackers.rows import TrackPlaces, event_rows, fill_views, trajectory_rows
 from stseg.tracking.windows.windows import window_length, windows
 
 COLOURED = ("belief", "particles")
@@ -206,9 +206,9 @@ def test_rows_are_sorted_and_hold_events_and_views() -> None:
     covariance = np.array([[[0.1, 0.02], [0.02, 0.3]]] * 2)
     ids, height = np.array([9, 4]), np.array([1.7, 1.8])
     tracks = TrackPlaces(ids, ground, covariance, height, height / 4, height * 3)
-    rows = trajectory_rows(7, tracks, height / 2, np.array([2, 3]))
+    rows = trajectory_rows(7, tracks, height / 2)
     assert rows["id"].tolist() == [4, 9] and rows["frame"].tolist() == [7, 7]
-    assert rows[["x", "y", "z", "xx", "xy", "yy", "views"]].tolist()[0] == (3.0, 4.0, 0.0, 0.1, 0.02, 0.3, 3)
+    assert rows[["x", "y", "z", "xx", "xy", "yy"]].tolist()[0] == (3.0, 4.0, 0.0, 0.1, 0.02, 0.3)
     np.testing.assert_allclose(rows["height"], [1.8, 1.7], rtol=1e-6)
     np.testing.assert_allclose(rows["width"], [0.45, 0.425], rtol=1e-6)
     rows = event_rows([(3, "hand-over", 5, 0, "found again after 2 unseen frames")])
@@ -216,4 +216,7 @@ def test_rows_are_sorted_and_hold_events_and_views() -> None:
     assert len(event_rows([])) == 0
     rig = replace(RIG, cameras=(replace(RIG.cameras[0], size=(60, 45)), *RIG.cameras[1:]))
     seen = Sampling.of(rig, "point").views().max(0).reshape(-1).tolist()
-    assert views_at(rig, rig.grid.ground.reshape(-1, 2)).tolist() == seen and set(seen) == {3, 4}
+    rows = np.zeros(len(seen), TRAJECTORY)
+    rows["x"], rows["y"] = rig.grid.ground.reshape(-1, 2).T
+    fill_views(rows, rig)
+    assert rows["views"].tolist() == seen and set(seen) == {3, 4}
