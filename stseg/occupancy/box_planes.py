@@ -17,12 +17,12 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.bodies.box_fit import half_square
 from stseg.bodies.pillar_index import PillarIndex, ViewBoxes, fill_fits
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
-from stseg.kernels.accelerate import kernel
+from stseg.kernels.accelerate import kernel, part
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.shown_cells import ShownCells
 
@@ -51,9 +51,29 @@ class CellsByPerson(NamedTuple):
     def of(cls, near_person: Ints, people: int) -> Self:
         """From the person near each cell, int64 (y, x), -1 for none, and the number of people."""
         flat = near_person.reshape(-1)
-        order = np.argsort(flat, kind="stable")
-        start = np.searchsorted(flat[order], np.arange(people + 1))
-        return cls(flat, order, start)
+        cell = np.flatnonzero(flat >= 0)
+        cell = cell[np.argsort(flat[cell], kind="stable")]
+        return cls(flat, cell, np.searchsorted(flat[cell], np.arange(people + 1)))
+
+
+class CellFit(NamedTuple):
+    """How well boxes fit bodies at ground cells.
+
+    Attributes
+    ----------
+    found : bool (cell,)
+        Cells that some box fits.
+    best : float32 (height, cell)
+        At these cells, the log-likelihood of the best box of each height, -inf where there is none.
+    """
+
+    found: Flags
+    best: Singles
+
+    @classmethod
+    def unfilled(cls, heights: int, cells: int) -> Self:
+        """No cell found yet."""
+        return cls(np.zeros(cells, bool), np.empty((heights, cells), np.float32))
 
 
 @kernel
@@ -65,9 +85,9 @@ def fill_fit(
     boxes: ViewBoxes,
     owner: Ints,
     cells: CellsByPerson,
-    fit: Singles,
+    fit: CellFit,
 ) -> None:
-    """Fill fit (height, cell): log-likelihood of the best box of each cell and height, -inf where there is none.
+    """Fill the fit, which has no cell yet.
 
     Parameters
     ----------
@@ -79,8 +99,7 @@ def fill_fit(
     owner : int64 (box,)
         The person that each box is assigned to, -1 for none.
     """
-    ground_cells, pillar, match = fit.shape[1], np.empty(len(index.order), np.int32), np.empty(len(index.order))
-    fit[:] = -np.inf
+    ground_cells, pillar, match = len(fit.found), np.empty(len(index.order), np.int32), np.empty(len(index.order))
     for b in range(len(boxes.edges)):
         box, tolerance, person = boxes.edges[b], boxes.tolerance[b], owner[b]
         if person >= 0:
@@ -88,19 +107,27 @@ def fill_fit(
                 for h in range(len(height_prior)):
                     body = pillars[h * ground_cells + cells.cell[k]]
                     own_match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
-                    log_fit = np.float32(person_prior[person, h] + own_match)
-                    fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
+                    _add_fit(np.float32(person_prior[person, h] + own_match), h, cells.cell[k], fit)
             continue
         number = fill_fits(index, pillars, boxes, b, boxes.belief[b] - _LEAST_FIT, pillar, match)
         for k in range(number):
             h, cell = pillar[k] // ground_cells, pillar[k] % ground_cells
             prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]
-            fit[h, cell] = max(fit[h, cell], np.float32(prior + match[k]))
+            _add_fit(np.float32(prior + match[k]), h, cell, fit)
+
+
+@part
+def _add_fit(log_fit: np.float32, h: int, cell: int, fit: CellFit) -> None:
+    if not fit.found[cell]:
+        fit.found[cell] = True
+        for other in range(len(fit.best)):
+            fit.best[other, cell] = -np.inf
+    fit.best[h, cell] = max(fit.best[h, cell], log_fit)
 
 
 @kernel
 def fill_levels(
-    fit: Singles,
+    fit: CellFit,
     heights: Floats,
     planes: Floats,
     cells: ShownCells,
@@ -112,23 +139,21 @@ def fill_levels(
 
     Parameters
     ----------
-    fit : float32 (height, place)
+    fit
         From `fill_fit`.
     heights : float64 (height,), planes : float64 (plane,)
         Metres, rising.
     footprint : int16 (cell, 4)
         In block order; see `stseg.geometry.sampling`.
     """
-    ground_cells, first_taller = fit.shape[1], np.searchsorted(heights, planes)
-    taller = fit.copy()
-    for h in range(len(heights) - 2, -1, -1):  # the best of all heights from each on
-        for c in range(ground_cells):
-            taller[h, c] = max(taller[h, c], taller[h + 1, c])
+    ground_cells, first_taller = len(fit.found), np.searchsorted(heights, planes)
     unfit = level_of_match(0.0, rates.miss, rates.clutter), level_of_match(0.0, rates.miss, rates.near_clutter)
     for k in range(len(cells.cell)):
         cell, place, is_near = np.uint64(cells.cell[k]), np.uint64(cells.place[k]), cells.near_person[k] >= 0
-        first = first_taller[np.uint64(cells.in_volume[k]) // np.uint64(ground_cells)]
-        best = float(taller[first, place]) if first < len(heights) else -np.inf
+        best = -np.inf
+        if fit.found[place]:
+            for h in range(first_taller[np.uint64(cells.in_volume[k]) // np.uint64(ground_cells)], len(heights)):
+                best = max(best, float(fit.best[h, place]))
         if footprint[cell, 2] == 0:
             levels[k] = UNSEEN
         elif best > -np.inf:

@@ -186,17 +186,18 @@ class CellTables:
         cell = np.arange(start[-1], dtype=np.int32) + np.repeat(before, self._width[block])
         sets, of_cell = self.sets, self.sets.of_cell[cell]
         others = sets.size - np.bincount(of_cell, minlength=len(sets.size))
-        seen_by = np.concatenate([sets.seen_by[of_cell], sets.seen_by])
-        unseen = np.where(np.ascontiguousarray(seen_by.T), np.int16(0), np.int16(UNSEEN))
+        of_sets = np.where(sets.seen_by.T, np.int16(0), np.int16(UNSEEN))
+        unseen = np.concatenate([of_sets.take(of_cell, 1), of_sets], 1)
         number = np.concatenate([_cell_numbers(len(cell)), others])
         return _MarkedCells(marked.copy(), cell, self.place[cell], self.in_volume[cell], block, start, unseen, number)
 
 
 def _cell_numbers(count: int) -> Floats:
     """Number of cells that each of `count` stands for; those of a block show nearly the same pixels."""
-    stride, number = 1 + count // _MOST_COUNTED, np.zeros(count)
-    number[np.arange(count) // BLOCK_SIDE**2 % stride == 0] = stride
-    return number
+    stride, side = 1 + count // _MOST_COUNTED, BLOCK_SIDE**2
+    number = np.zeros((1 + count // (stride * side), stride, side))
+    number[:, 0] = stride
+    return number.reshape(-1)[:count]
 
 
 @kernel

@@ -16,7 +16,7 @@ from stseg.geometry import Rig
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable
-from stseg.occupancy.box_planes import CellsByPerson, fill_fit, fill_levels, level_of_match
+from stseg.occupancy.box_planes import CellFit, CellsByPerson, fill_fit, fill_levels, level_of_match
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
@@ -37,7 +37,7 @@ class _PreparedView(NamedTuple):
     assignment: PixelAssignment
     marked: Flags
     table: SumTable | None
-    fit: Singles | None
+    fit: CellFit | None
 
 
 class _Fused(NamedTuple):
@@ -148,7 +148,7 @@ class Occupancy:
         columns = near_person >= 0
         for view in views:
             if view is not None and view.fit is not None:
-                columns |= (view.fit > -np.inf).any(0)
+                columns |= view.fit.found
         return np.tile(np.logical_or.reduceat(columns, self._tables.ground_start), self.rig.grid.planes)
 
     def _terms(
@@ -252,8 +252,8 @@ class Occupancy:
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 
-    def _fit(self, i: int, view: Boxes, explanation: Explanation, near_person: Ints, noise: BoxNoise) -> Singles:
-        """Log-likelihood of the best box of each height and ground cell; see `fill_fit`."""
+    def _fit(self, i: int, view: Boxes, explanation: Explanation, near_person: Ints, noise: BoxNoise) -> CellFit:
+        """How well the boxes of a view fit bodies at the ground cells."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
         people, owner = explanation.people, explanation.box_assignment[i]
@@ -265,7 +265,7 @@ class Occupancy:
         boxes = ViewBoxes(edges, *noise.of(view.score), width, height)
         cells = CellsByPerson.of(near_person, len(people))
         priors = self._height_prior(np.array([self.height_mean]))[0], self._height_prior(people.height)
-        fit = np.empty((len(self.heights), near_person.size), np.float32)
+        fit = CellFit.unfilled(len(self.heights), near_person.size)
         fill_fit(pillars[1], pillars[0], *priors, boxes, owner, cells, fit)
         return fit
 
