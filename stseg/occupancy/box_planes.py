@@ -57,7 +57,7 @@ class CellsByPerson(NamedTuple):
 
 
 class CellFit(NamedTuple):
-    """How well boxes fit bodies at ground cells.
+    """Fit of boxes to bodies at ground cells.
 
     Attributes
     ----------

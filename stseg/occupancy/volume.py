@@ -253,7 +253,7 @@ class Occupancy:
         return pillars, PillarIndex.of(pillars, camera.size)
 
     def _fit(self, i: int, view: Boxes, explanation: Explanation, near_person: Ints, noise: BoxNoise) -> CellFit:
-        """How well the boxes of a view fit bodies at the ground cells."""
+        """Fit of the boxes of a view to bodies at the ground cells."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
         people, owner = explanation.people, explanation.box_assignment[i]
