@@ -76,7 +76,6 @@ def paint_outlines(order: Ints, first: Ints, spans: Spans, assigned: Shorts) -> 
                 assigned[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
 
 
-@kernel
 def sums_inside(
     table: BodyTable, pillars: Pillars, step: int, values: Singles, owner: Shorts, number: Ints
 ) -> tuple[Floats, Floats]:
@@ -100,25 +99,34 @@ def sums_inside(
     sums, area : float64 (person, pillar)
         Of what counts, and pixels of the whole outline; both 0 where the view does not see the pillar.
     """
+    sums, area = result = np.zeros((2, *pillars.height.shape))
+    _fill_sums(table, pillars, float(step), values, owner, number, result)
+    return sums, area
+
+
+@kernel
+def _fill_sums(
+    table: BodyTable, pillars: Pillars, step: float, values: Singles, owner: Shorts, number: Ints, result: Floats
+) -> None:
+    """Fill the sums and areas of `sums_inside`, which are 0 before."""
     people, pillar_count = pillars.height.shape
     rows, columns = values.shape
-    sums, area = np.zeros((people, pillar_count)), np.zeros((people, pillar_count))
+    sums, area = result[0], result[1]
     discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((pillar_count, len(SILHOUETTE), 6))
     low, high, left_of = np.empty(rows), np.empty(rows), np.empty(rows * (columns + 1))
     for j in range(people):
         for i in range(pillar_count):
-            ground = pillars.ground[j, i]
-            x, y = (ground[0] - table.origin[0]) / table.step, (ground[1] - table.origin[1]) / table.step
+            x = (pillars.ground[j, i, 0] - table.origin[0]) / table.step
+            y = (pillars.ground[j, i, 1] - table.origin[1]) / table.step
             fill_discs(table, x, y, pillars.height[j, i], SILHOUETTE, discs)
             if _seen(discs):
-                area[j, i] = _fill_drawn(discs, float(step), pillars.width[j, i], drawn[i])
+                area[j, i] = _fill_drawn(discs, step, pillars.width[j, i], drawn[i])
         window = _window(drawn, area[j], rows, columns)
         _fill_left_of(values, owner, number[j], window, left_of)
         for i in range(pillar_count):
             if area[j, i] > 0:
                 top, bottom = _draw(drawn[i], low, high)
                 sums[j, i] = _between(left_of, window, low, high, top, bottom, columns)
-    return sums, area
 
 
 @kernel
@@ -135,8 +143,8 @@ def _fill_outlines(
     rows, (discs, drawn) = spans.shape[1], np.empty((2, len(SILHOUETTE), 6))
     low, high = np.empty(rows), np.empty(rows)
     for i in range(len(first)):
-        ground = pillars.ground[i]
-        x, y = (ground[0] - table.origin[0]) / table.step, (ground[1] - table.origin[1]) / table.step
+        x = (pillars.ground[i, 0] - table.origin[0]) / table.step
+        y = (pillars.ground[i, 1] - table.origin[1]) / table.step
         fill_discs(table, x, y, pillars.height[i], SILHOUETTE, discs)
         if _seen(discs):
             area[i] = _fill_drawn(discs, raster_step, pillars.width[i], drawn)
