@@ -22,10 +22,8 @@ from stseg.geometry.fits import fit_homography, fit_vertical
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import write_rig
 
-ROW, ROWS = 36, 37
-CELL, BODY = 0.20, 1.75  # metres
-SIZE = (160, 120)
-FRAME_RATE = 5.0  # frames per second; not said either
+ROW, ROWS, CELL, BODY = 36, 37, 0.20, 1.75  # of cells; metres
+SIZE, FRAME_RATE = (160, 120), 5.0  # pixels; frames per second, not said either
 
 
 def read_rectangles(path: Path, camera: int) -> tuple[Floats, Floats]:
@@ -51,12 +49,10 @@ def fit_camera(name: str, ground: Floats, rectangle: Floats) -> Camera:
 
 def main(folder: Path, output: Path) -> None:
     """Write the rig file."""
-    cameras, sources = [], []
-    for index in range(2):
-        cameras.append(fit_camera(f"c{index}", *read_rectangles(folder / "test.pom", index)))
-        sources.append(CameraSource(Source("masks", folder / "images" / f"view-f*-c{index}.png")))
+    cameras = tuple(fit_camera(f"c{k}", *read_rectangles(folder / "test.pom", k)) for k in range(2))
+    sources = tuple(CameraSource(Source("masks", folder / "images" / f"view-f*-c{k}.png")) for k in range(2))
     grid = Grid((0.0, CELL * (ROW - 1)), (0.0, CELL * (ROWS - 1)))
-    write_rig(output, Recording(output, Rig("pom", FRAME_RATE, grid, tuple(cameras)), tuple(sources)))
+    write_rig(output, Recording(output, Rig("pom", FRAME_RATE, grid, cameras), sources))
     print(f"wrote {output}")
 
 

@@ -21,7 +21,7 @@ def report(
     truth: Path | None = None,
     frame: Annotated[tuple[int, ...], Parameter(negative="")] = (),
     pictures: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
-    video: Annotated[Path | None, Parameter(metavar="FILM.mp4")] = None,
+    video: Annotated[Path | None, Parameter(metavar="FILM.webm")] = None,
     frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
     camera_images: Annotated[bool, Parameter(negative="")] = False,
     names: Annotated[Path | None, Parameter(metavar="NAMES.csv")] = None,
@@ -31,7 +31,7 @@ def report(
 
     Example: stseg report night.h5 -o night.html --truth truth.csv --frame 60 --pictures night/
 
-    Example: stseg report night.h5 --video night.mp4 --camera-images --frames 0:500
+    Example: stseg report night.h5 --video night.webm --camera-images --frames 0:500
 
     The page shows the number of people, where they dwell, rejected ghosts with reasons, and where the rig is blind; a
     slider moves the plan, slices of the occupancy and the tracks in space and time. The film shows every view with its
@@ -54,7 +54,8 @@ def report(
         overlay_CAMERA.png for each camera, and the maps density.png, dwell.png, flow.png, ghosts.png and blind.png.
         With several --frame, the frame's number is added to the name.
     video
-        A film to write, MP4. It shows the cameras' frames with --camera-images, else pillars on the ruled ground.
+        A film to write, WebM or, in four times the time, MP4. It shows the cameras' frames with --camera-images, else
+        pillars on the ruled ground.
     frames
         Part of the run that the film shows, half open.
     camera_images

@@ -129,12 +129,13 @@ class RunFilm:
         wide, tall = np.maximum(views_size, ends).tolist()
         self.size = (wide + wide % 2, tall + tall % 2)
         """Width and height, pixels; both even, as video wants them."""
+        self._sheet = blank(*self.size, PAPER)
 
     def picture(self, frame: int, views: Sequence[Observation]) -> Picture:
         """One frame with each camera's observation, in the rig's order; None shows the ruled ground instead."""
         first, stop = np.searchsorted(self._rows["frame"], [frame - self._trail, frame + 1])
         recent = self._rows[first:stop]
-        canvas = blank(*self.size, PAPER)
+        canvas = self._sheet.copy()
         for k, (camera, view) in enumerate(zip(self._rig.cameras, views, strict=True)):
             picture = overlay(
                 camera, self._rig.grid, backdrop(view, camera.size), recent, frame, self._trail, width=self._wide

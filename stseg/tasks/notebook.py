@@ -32,10 +32,11 @@ class FilmFile:
     """A film that was written; notebooks play it."""
 
     path: Path
-    """The MP4 file."""
+    """The WebM or MP4 file."""
 
     def _repr_html_(self) -> str:
-        return f'<video controls width="960" src="{data_uri("video/mp4", self.path.read_bytes())}"></video>'
+        kind = f"video/{self.path.suffix[1:].lower()}"
+        return f'<video controls width="960" src="{data_uri(kind, self.path.read_bytes())}"></video>'
 
 
 def plan_picture(run: Run) -> PlanPicture:

@@ -57,7 +57,7 @@ def report(
     pictures
         Folder to write the pictures of the page to as well.
     video
-        A film to write, MP4.
+        A film to write, WebM or, in four times the time, MP4.
     frames
         (first, stop), half open: the part of the run that the film shows; None for all.
     camera_images
@@ -99,11 +99,11 @@ def require_outputs(
 ) -> None:
     """Refuse outputs that cannot be written and options without effect, before any work."""
     if output is None and video is None:
-        raise ConfigError("command line", "", "nothing to write", "-o REPORT.html, or --video FILM.mp4")
+        raise ConfigError("command line", "", "nothing to write", "-o REPORT.html, or --video FILM.webm")
     if output is None and pictures is not None:
         raise ConfigError("command line", "--pictures", pictures, "-o REPORT.html with it")
     if video is None and frames is not None:
-        raise ConfigError("command line", "--frames", frames, "--video FILM.mp4 with it")
+        raise ConfigError("command line", "--frames", frames, "--video FILM.webm with it")
     for path in (output, video):
         if path is not None:
             require_output(path, overwrite, inputs)

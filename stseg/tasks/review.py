@@ -99,6 +99,7 @@ def _question(run: Run, doubt: Doubt, views: Mapping[int, tuple[Observation, ...
     film = plan_film(run.trajectory, first, last, doubt.first, run.frame_rate, ids)
     (x, y), seconds = ground.mean(axis=0), doubt.first / run.frame_rate
     (words, choices), wrong = question_words(doubt), f"wrong with a probability of {100 * doubt.chance:.0f} %"
+    wrong += ": a second look, by the other answer, fits better" if doubt.chance > 1 / 2 else ""
     at = f"{words} At {clock_time(seconds)}, near ({x:.1f}, {y:.1f}); the run is {wrong}."
     return Question(at, [*choices, ("0", "cannot tell", "")], pictures, film)
 

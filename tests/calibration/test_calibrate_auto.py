@@ -98,9 +98,9 @@ def painted(*bodies: tuple[float, float, float, float]) -> Singles:
 
 
 def test_ends_of_one_who_stands_free_and_of_meetings() -> None:
-    ((foot, head),) = upright_endpoints(painted((100, 150, 110, 80)))
-    np.testing.assert_allclose(foot, [99, 157.5], atol=2)
-    np.testing.assert_allclose(head, [111, 72.5], atol=2)
+    for gap in (0, 4):  # a narrow silhouette breaks at the neck
+        (image := painted((100, 150, 110, 80)))[92 : 92 + gap] = 0
+        np.testing.assert_allclose(upright_endpoints(image), [[[99, 157.5], [111, 72.5]]], atol=2)
     frame = np.arange(12)
     pixel = np.zeros((12, 2))
     endpoints = [Endpoints(frame + late, pixel, pixel - [0, 50]) for late in (0, 3)]

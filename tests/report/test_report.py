@@ -288,17 +288,16 @@ def test_films_show_pillars_and_the_plan_of_one_or_many_cameras(recording: Recor
 
 
 def test_the_film_has_the_frames_that_were_asked_for(walk_path: Path, tmp_path: Path, stdout: Command) -> None:
-    assert "a.mp4: 6 frames" in stdout("report", walk_path, "--video", tmp_path / "a.mp4", "--camera-images")
-    whole = frames_of(tmp_path / "a.mp4")
-    assert len(whole) == 6
+    assert "a.webm: 6 frames" in stdout("report", walk_path, "--video", tmp_path / "a.webm", "--camera-images")
+    assert len(whole := frames_of(tmp_path / "a.webm")) == 6
     darkened = tuple(round(0.85 * tone) for tone in VIVID)
     assert is_close(whole[0][400, 20], (darkened[0], darkened[1], darkened[2]), 12)
     row = walk()[0]
     body = np.rint(OverlayView(front_camera("left", 1), 640).pixel(np.array([row["x"], row["y"]]), 0.9)).astype(int)
     assert not is_close(whole[0][body[1], body[0]], (darkened[0], darkened[1], darkened[2]), 30)  # the pillar
     assert not list(tmp_path.glob("*.part*"))
-    stdout("report", walk_path, "--video", tmp_path / "a.mp4", "--frames", "12:13", "--overwrite")
-    assert len(frames_of(tmp_path / "a.mp4")) == 1
+    stdout("report", walk_path, "--video", tmp_path / "a.webm", "--frames", "12:13", "--overwrite")
+    assert len(frames_of(tmp_path / "a.webm")) == 1
 
 
 @cases()
@@ -328,9 +327,10 @@ def test_what_goes_wrong_on_the_way_leaves_no_film(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
-def test_a_browser_plays_the_film(walk_path: Path, tmp_path: Path) -> None:
-    assert main(["report", str(walk_path), "--video", str(tmp_path / "a.mp4"), "--frames", "10:12"]) == 0
-    (tmp_path / "film.html").write_text("<video src='a.mp4' muted></video>")
+@pytest.mark.parametrize("film", ["a.webm", "a.mp4"])
+def test_a_browser_plays_the_film(walk_path: Path, tmp_path: Path, film: str) -> None:
+    assert main(["report", str(walk_path), "--video", str(tmp_path / film), "--frames", "10:12"]) == 0
+    (tmp_path / "film.html").write_text(f"<video src='{film}' muted></video>")
     with chromium(tmp_path / "profile") as page:
         page.open(tmp_path / "film.html")
         page.wait_for("(v => v.error || v.readyState > 1)(document.querySelector('video'))")

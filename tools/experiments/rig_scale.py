@@ -3,8 +3,9 @@
     python tools/experiment.py rig_scale
 
 Five rigs are of `uu4_colour`: all four views, and three of them. The others are of simulated rooms, whose masks are
-cropped, wider or narrower by view, some with shadows. The scale is that of people's places. `uu4` lends its lenses; its
-cameras are placed by the board on its floor: their own places miss it by a pixel, and ground 4 m away by 0.1 to 0.3 m.
+cropped, wider or narrower by view, some with shadows; rooms from 18 on are held apart. Scales are of the floor, and of
+people's places. `uu4` lends its lenses; the board on its floor places its cameras: by their own places they miss it by
+a pixel, and ground 4 m away by 0.1 to 0.3 m.
 """
 
 from __future__ import annotations
@@ -34,9 +35,8 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import SceneFilm, SceneSpec, Spoil
 from stseg.tasks.calibration.automatic import people_of
 
-_ROOMS, _PLACES, _LEAST_METRES, _MARGIN, _SQUARE = 18, 400, 1.5, 0.1, 0.115
-"""Rooms; places of people; least distance, metres; least way to the border, image widths; side of a square, metres."""
-_TRUTH = "$DATA/uu4/reference_tracks.csv"
+_ROOMS, _PLACES, _LEAST_METRES, _MARGIN, _SQUARE, _MIDDLE = 22, 400, 1.5, 0.1, 0.115, 0.9
+"""Rooms; places; least distance, metres; least way to the border, image widths; a square's side; height of middles."""
 
 
 def shown(camera: Camera, ground: Floats) -> tuple[Floats, Flags]:
@@ -54,19 +54,27 @@ def distances(rig: Rig, ground: Floats) -> Iterator[KnownDistance]:
             yield KnownDistance(view, pixel, metres)
 
 
-def scale(made: tuple[Camera, ...], rig: Rig, ground: Floats) -> float:
-    """Scale of the similarity that takes places to where the cameras of a made rig see them."""
-    views = [(camera, *shown(true, ground)) for true, camera in zip(rig.cameras, made, strict=True)]
-    place = np.concatenate([ground[is_shown] for _, _, is_shown in views]) @ [1, 1j]
-    found = np.concatenate([camera.back_project(pixel[is_shown]) for camera, pixel, is_shown in views]) @ [1, 1j]
-    place, found = place[np.isfinite(found)], found[np.isfinite(found)]
-    return float(abs(np.vdot(place - place.mean(), found - found.mean())) / (place.var() * len(place)))
+def scales(made: tuple[Camera, ...], rig: Rig, ground: Floats) -> Iterator[float]:
+    """Scale of the floor as each made camera sees it, and of where the rays of all to the middles of bodies meet."""
+    views = [(camera, true, *shown(true, ground)) for true, camera in zip(rig.cameras, made, strict=True)]
+    seen = np.concatenate([camera.back_project(pixel[is_shown]) for camera, _, pixel, is_shown in views])
+    normal, moment = np.zeros((len(ground), 3, 3)), np.zeros((len(ground), 3))
+    for camera, true, _, is_shown in views:
+        ray = camera.rays(true.project(ground, _MIDDLE)[0])
+        across = np.eye(3) - ray[:, :, None] * ray[:, None] / (ray**2).sum(axis=1)[:, None, None]
+        across[~(is_shown & np.isfinite(ray).all(axis=1))] = 0
+        normal, moment = normal + across, moment + across @ camera.centre
+    met = np.linalg.matrix_rank(normal, 1e-3) == 3
+    meeting = np.linalg.solve(normal[met], moment[met][..., None])[:, :2, 0]
+    for place, found in ((np.concatenate([ground[one[3]] for one in views]), seen), (ground[met], meeting)):
+        a, b = (points[np.isfinite(found).all(axis=1)] @ [1, 1j] for points in (place, found))
+        yield float(abs(np.vdot(a - a.mean(), b - b.mean())) / (a.var() * len(a)))
 
 
 def on_board(bench: Bench, camera: Camera) -> Camera:
     """A camera of `uu4`, placed by the board on the floor."""
-    film = cv2.VideoCapture(str(bench.path(f"$DATA/uu4/{camera.name}/extrinsics.avi")))
-    grey = cv2.cvtColor(film.read()[1], cv2.COLOR_BGR2GRAY)
+    image = cv2.VideoCapture(str(bench.path(f"$DATA/uu4/{camera.name}/extrinsics.avi"))).read()[1]
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     _, corners = cv2.findChessboardCorners(grey, (8, 6))
     corner = cv2.cornerSubPix(grey, corners, (4, 4), (-1, -1), (3, 30, 0.01)).reshape(-1, 2).astype(float)
     ground = _SQUARE * (camera.back_project(corner) / _SQUARE).round()
@@ -81,13 +89,14 @@ def real(bench: Bench) -> Iterator[Seen]:
     """The real recording, by all views and by three."""
     bench.do(SETS["uu4_colour"].prepare[0])
     recording = read_recording(bench.path("$WORK/uu4_colour.toml"))
-    people, rows = people_of(recording, None, 1.7, 2.0, reporter_of(None))[0], read_tracks_csv(bench.path(_TRUTH))
+    rows = read_tracks_csv(bench.path("$DATA/uu4/reference_tracks.csv"))
+    people = people_of(recording, None, 1.7, 2.0, reporter_of(None))[0]
     cameras = [on_board(bench, camera) for camera in recording.rig.cameras]
     for left_out in (None, *range(len(cameras))):
         views = [k for k in range(len(cameras)) if k != left_out]
         rig = replace(recording.rig, cameras=tuple(cameras[k] for k in views))
         seen = replace(people, endpoints=tuple(people.endpoints[k] for k in views), sizes=people.sizes[: len(views)])
-        name = "uu4_colour" if left_out is None else f"uu4_colour without {cameras[left_out].name}"
+        name = "uu4_colour" + ("" if left_out is None else f" without {cameras[left_out].name}")
         yield name, rig, np.column_stack([rows["x"], rows["y"]]), seen
 
 
@@ -111,25 +120,25 @@ def room(number: int) -> Seen:
             mask = (cv2.dilate if by > 0 else cv2.erode)(view.mask, np.ones((2 * abs(by) + 1,) * 2, np.uint8))
             found.append((frame.frame, upright_endpoints(mask[v : v + size[1], u : u + size[0]] / np.float32(255))))
     rig = replace(film.rig, cameras=tuple(cropped(*one, size) for one in zip(film.rig.cameras, corner, strict=True)))
-    seen = tuple(map(concatenate_endpoints, ends))
-    return spec.name, rig, np.concatenate(places), CalibrationInput(seen, (size,) * views, 5.0, 1.7, 2.0)
+    seen = CalibrationInput(tuple(map(concatenate_endpoints, ends)), (size,) * views, 5.0, 1.7, 2.0)
+    return spec.name, rig, np.concatenate(places), seen
 
 
 def cropped(camera: Camera, corner: Ints, size: tuple[int, int]) -> Camera:
     """A camera of a part of its image, from a corner on."""
     assert camera.lens is not None
     move = np.array([[1, 0, -corner[0]], [0, 1, -corner[1]], [0, 0, 1.0]])
-    lens = move @ camera.lens.matrix, camera.lens.distortion
-    return Camera.from_projection(camera.name, size, move @ camera.projection, Lens(*lens))
+    lens = Lens(move @ camera.lens.matrix, camera.lens.distortion)
+    return Camera.from_projection(camera.name, size, move @ camera.projection, lens)
 
 
 def main() -> None:
     """Measure, rig by rig."""
-    asked = command_line(__doc__).parse_args()
-    bench, rows = Bench(asked.data.resolve(), asked.work.resolve()), [["rig", "distances", "error %", "stated %"]]
+    asked, rows = command_line(__doc__).parse_args(), [["rig", "distances", "floor error %", "error %", "stated %"]]
+    bench = Bench(asked.data.resolve(), asked.work.resolve())
     for name, rig, ground, people in chain(real(bench), map(room, range(_ROOMS))):
-        places = np.random.default_rng(0).choice(ground, _PLACES)
-        known, names = list(distances(rig, places)), [camera.name for camera in rig.cameras]
+        places, names = np.random.default_rng(0).choice(ground, _PLACES), [camera.name for camera in rig.cameras]
+        known = list(distances(rig, places))
         try:
             solution = calibrate_from_people(names, people, lambda: None)
         except SourceError as refusal:
@@ -137,7 +146,7 @@ def main() -> None:
             continue
         for given in (known[:0], known[:1], known[:3]):
             made = adjusted_to(solution, given) if given else solution
-            error, stated = scale(cameras_of(made, names), rig, places) - 1, scale_spread(made, given)
-            rows.append([name, str(len(given)), f"{100 * error:+.1f}", f"{100 * stated:.1f}"])
+            errors = [f"{100 * one - 100:+.1f}" for one in scales(cameras_of(made, names), rig, places)]
+            rows.append([name, str(len(given)), *errors, f"{100 * scale_spread(made, given):.1f}"])
             print(*rows[-1], flush=True)
         write_table(asked.output / "rig_scale.csv", rows)

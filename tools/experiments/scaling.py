@@ -25,9 +25,7 @@ from stseg.geometry import Rig
 from stseg.simulation import NAMED, SceneFilm
 from stseg.simulation.rendering.render import RenderedView
 
-Axes = dict[str, tuple[str, tuple[int, ...]]]
-
-AXES: Axes = {
+AXES: dict[str, tuple[str, tuple[int, ...]]] = {
     "area": ("side of the ground, m", (5, 10, 20, 40)),
     "views": ("views", (2, 4, 8, 16)),
     "people": ("people", (1, 5, 10, 20, 50)),
@@ -36,11 +34,8 @@ AXES: Axes = {
 """What is changed, and the values that it takes."""
 KINDS = ("masks", "boxes", "video")
 _USUAL = {"area": 10, "views": 8, "people": 10, "pixels": 320}
-_MOST_VIEWS = 16
-_READY, _MEASURED = 8, 16
-"""Frames before the clock starts, and while it runs."""
-_EMPTY = 10
-"""Images from which a background is learned."""
+_MOST_VIEWS, _READY, _MEASURED, _EMPTY = 16, 8, 16, 10
+"""Views; frames before the clock starts, and while it runs; images from which a background is learned."""
 _STAGES = ("foreground", "detection", "occupancy", "tracking")
 
 

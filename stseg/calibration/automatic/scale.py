@@ -16,19 +16,19 @@ from stseg.calibration.adjusted_rig import scaled
 from stseg.calibration.automatic.endpoints import even_rows
 from stseg.calibration.automatic.solution import SolvedViews
 from stseg.calibration.bundle_adjustment import adjust
-from stseg.calibration.pinhole import on_plane
+from stseg.calibration.pinhole import CENTRE, on_plane
 
 _MEAN_HEIGHT_SPREAD, _BODY_HEIGHT_SPREAD = 0.067, 0.07
 """Standard deviations of the mean height of people of one place, and between these people of one sex, metres.
 
 The former is of countries (0.05), of men and women in any mixture (0.04), and of shoes and hair (0.02): NCD Risk Factor
 Collaboration, A century of trends in adult human height, eLife 5, 2016."""
-_PIXEL_SPREAD = 1.0
-"""Standard deviation of a pixel that a person names."""
-_ROUNDS = 2
-_STEP_SIZE = 1e-5
-_FEET = 100
-"""Most feet of a view by which the size of the plan is known."""
+_GROUND_SPREAD = 0.045
+"""Standard deviation of the ground's height beyond what the adjustment knows, metres: feet differ from their model in
+all views alike, by shoes and gait. Known lengths on the floor stay; places of people above it do not."""
+_PIXEL_SPREAD, _FEET = 1.0, 100
+"""Standard deviation of a pixel that a person names; most feet of a view by which the size of the plan is known."""
+_ROUNDS, _STEP_SIZE = 2, 1e-5
 
 
 @dataclass(frozen=True)
@@ -74,15 +74,16 @@ def adjusted_to(solution: SolvedViews, known: Sequence[KnownDistance]) -> Solved
 
 
 def scale_spread(solution: SolvedViews, known: Sequence[KnownDistance]) -> float:
-    """Relative standard deviation of the scale: of the distances, or of the heights where there are none."""
-    covariance = _size_covariance(solution, known)
+    """Relative standard deviation of people's places: by the distances, or by the heights where there are none."""
+    covariance, parameters = _size_covariance(solution, known), solution.adjustment.parameters
+    ground = _GROUND_SPREAD / np.median(parameters.views[:, CENTRE][:, 2])
     if known:
         weight = _weights(covariance[1:, 1:])
         scatter = _shortage(solution, known).std(ddof=1) * np.linalg.norm(weight) if len(known) > 1 else 0.0
-        return float(max(np.sqrt(weight @ covariance[1:, 1:] @ weight), scatter))
-    matched, tall = solution.problem.correspondences, np.median(solution.adjustment.parameters.points[:, 2])
+        return float(np.hypot(ground, max(np.sqrt(weight @ covariance[1:, 1:] @ weight), scatter)))
+    matched, tall = solution.problem.correspondences, np.median(parameters.points[:, 2])
     body = np.hypot(_MEAN_HEIGHT_SPREAD, _BODY_HEIGHT_SPREAD / np.sqrt(np.bincount(matched.frame).max())) / tall
-    return float(np.sqrt(body**2 + covariance[0, 0]))
+    return float(np.sqrt(body**2 + ground**2 + covariance[0, 0]))
 
 
 def _weights(covariance: Floats) -> Floats:

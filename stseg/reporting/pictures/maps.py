@@ -185,8 +185,7 @@ def _ramp(canvas: Bytes, plan: PlanMap, limit: float, units: str) -> None:
     corners = np.array([[u, v], [u + length, v], [u + length, v + tall], [u, v + tall]])
     outline(canvas, corners, mixed(QUIET, PAPER, 0.5))
     text(canvas, "0", (u, v + tall + 7), QUIET, 14, (0, 0))
-    words = f"{limit:.2g} or more"
-    text(canvas, words, (u + length, v + tall + 7), QUIET, 14, (0.5, 0))
+    text(canvas, f"{limit:.2g} or more", (u + length, v + tall + 7), QUIET, 14, (0.5, 0))
     text(canvas, units, (u + length + 16, v + tall / 2), QUIET, 15, (0, 0.5))
     if u + length + 16 + text_size(units, 15)[0] < plan.size[0] - 320:
         scale_bar(canvas, plan, (plan.size[0] - 44.0, v + tall / 2))

@@ -94,7 +94,7 @@ class OverlayView:
         if image.ndim == 2:
             tones = np.linspace(NIGHT, mixed(NIGHT, PAPER, 0.5), 256)
             return np.asarray(np.rint(tones)[scaled], np.uint8)
-        return np.asarray(np.rint(scaled * 0.85), np.uint8)
+        return np.asarray(cv2.convertScaleAbs(scaled, alpha=0.85), np.uint8)
 
     def pixel(self, ground: AnyArray, height: AnyArray | float) -> Floats:
         """Where the picture shows points, float64 (..., 2); nan behind the camera and far off the picture."""
