@@ -25,6 +25,7 @@ COEFFICIENTS: Mapping[LensModel, tuple[str, ...]] = {
 }
 """Names of the numbers of `Lens.distortion`, by model."""
 _UNDISTORT_ROUNDS = 50
+_LEAST_FOCAL = 1e-6  # pixels: smaller ones leave no digits of a projection
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Lens:
         if not names:
             raise CalibrationError("lens", "model", repr(self.model), f"one of {', '.join(COEFFICIENTS)}")
         is_affine = matrix.shape == (3, 3) and matrix[1, 0] == 0 and matrix[2].tolist() == [0, 0, 1]
-        if not (is_affine and matrix[0, 0] > 0 and matrix[1, 1] > 0):
+        if not (is_affine and min(matrix[0, 0], matrix[1, 1]) > _LEAST_FOCAL):
             expected = "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]"
             raise CalibrationError("lens", "matrix", matrix.tolist(), expected)
         if len(given) > len(names) or not np.isfinite(given).all():
