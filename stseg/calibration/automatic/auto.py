@@ -99,8 +99,10 @@ def _agreements(places: Sequence[ViewPlaces], placed: Mapping[int, Alignment]) -
     return table
 
 
-_FLOOR_ROUNDS, _FLOOR_CELL = 2, 0.1
-"""Rounds of floor features: a better rig rectifies the floor better, which finds more; its cell there, metres."""
+_FLOOR_ROUNDS = 2
+"""Rounds of floor features: a better rig rectifies the floor better, which finds more features."""
+_FLOOR_CELL = 0.1
+"""Cell of the rectified floor, metres."""
 
 
 def placed_views(single_cameras: Sequence[Floats], merged: MergedViews) -> Floats:
@@ -171,9 +173,12 @@ def sharpen_by_floor(
     return solution, count
 
 
-_MIN_ENDPOINTS, _MIN_FOOT_SPREAD, _MIN_AGREEMENT = 40, 0.25, 0.5
-"""Isolated people (a person in a frame counts once) that a view needs; least standard deviation of their feet over the
-image, in body lengths; least share of them that agree with another view's."""
+_MIN_ENDPOINTS = 40
+"""Isolated people (a person in a frame counts once) that a view needs."""
+_MIN_FOOT_SPREAD = 0.25
+"""Least standard deviation of their feet over the image, in body lengths."""
+_MIN_AGREEMENT = 0.5
+"""Least share of a view's people that agree with another view's."""
 
 
 def require_people(name: str, endpoints: Endpoints) -> None:

@@ -10,8 +10,10 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints
 from stseg.calibration.automatic.endpoints import Endpoints
 
-_MAX_WALKING_SPEED, _LINK_SECONDS = 2.5, 0.5
-"""Greatest walking speed, metres per second; longest gap between two points of one track, seconds."""
+_MAX_WALKING_SPEED = 2.5
+"""Greatest walking speed, metres per second."""
+_LINK_SECONDS = 0.5
+"""Longest gap between two points of one track, seconds."""
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,20 @@ from stseg.arrays import AnyArray, Bytes, Floats, Ints, Singles
 
 SILHOUETTE_LIKELIHOOD = 0.8
 """Foreground likelihood of a silhouette's pixels, at least."""
-_MIN_AREA, _MIN_LENGTH, _MIN_ELONGATION = 1.5e-3, 0.10, 2.0
-"""Least area and length of a person, shares of the image's area and height, and length over width (deviations)."""
+_MIN_AREA, _MIN_LENGTH = 1.5e-3, 0.10
+"""Least area and length of a person, shares of the image's area and height."""
+_MIN_ELONGATION = 2.0
+"""Least ratio of length to width (standard deviations) of a silhouette."""
 _HEAD_SHARE, _FEET_SHARE = 0.06, 0.12
 """Shares of a silhouette's length taken as the top of the head and the feet."""
 _EROSION = 1.0
 """Distance from the centre of a silhouette's last pixel to the end of the body, pixels: half a pixel, and as much again
 lost to pooling over neighbours and to the high likelihood threshold."""
-_SPECK, _BRIDGE = 9, (7, 3)
-"""Pixels of a component below which it is noise; height and width of what joins fragments: narrow silhouettes break at
-necks and ankles, which a median filter would take away."""
+_SPECK = 9
+"""Pixels of a component below which it is noise."""
+_BRIDGE = (7, 3)
+"""Height and width of what joins fragments, pixels: narrow silhouettes break at necks and ankles, which a median filter
+would take away."""
 _CLEARANCE, _MIN_CLEARANCE = 0.03, 5
 """Free space around an isolated silhouette, share of its length, and at least so many pixels."""
 _NOISE_AREA = 0.03

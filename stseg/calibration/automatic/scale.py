@@ -26,8 +26,10 @@ Collaboration, A century of trends in adult human height, eLife 5, 2016."""
 _GROUND_SPREAD = 0.045
 """Standard deviation of the ground's height beyond what the adjustment knows, metres: feet differ from their model in
 all views alike, by shoes and gait. Known lengths on the floor stay; places of people above it do not."""
-_PIXEL_SPREAD, _FEET = 1.0, 100
-"""Standard deviation of a pixel that a person names; most feet of a view by which the size of the plan is known."""
+_PIXEL_SPREAD = 1.0
+"""Standard deviation of a pixel that a person names."""
+_FEET = 100
+"""Most feet of a view by which the size of the plan is known."""
 _ROUNDS, _STEP_SIZE = 2, 1e-5
 
 

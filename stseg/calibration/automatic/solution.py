@@ -18,18 +18,24 @@ _GATES = (0.8, 0.6, 0.5, 0.5, 0.5)
 """Correspondence gate of each round, metres."""
 ROUNDS = len(_GATES)
 _MAX_POINTS = 1200
-_HEIGHT_SPREAD, _HEAD_SPREAD = 0.08, 0.03
-"""Standard deviations of body height between people, and of the head height of one who walks, metres."""
+_HEIGHT_SPREAD = 0.08
+"""Standard deviation of body height between people, metres."""
+_HEAD_SPREAD = 0.03
+"""Standard deviation of the head height of one walking person, metres."""
 _MIN_SPREAD = np.array([[0.02, 0.01], [0.004, 0.01]])
 """Least standard deviations of feet and heads, along and across, in body lengths."""
-_MIN_FREEDOM, _MIN_PIXEL_SPREAD = 0.1, 0.3
-"""Share of a residual's variance below which it says nothing of its spread; least spread of an endpoint, pixels."""
+_MIN_FREEDOM = 0.1
+"""Share of a residual's variance below which it says nothing of its spread."""
+_MIN_PIXEL_SPREAD = 0.3
+"""Least standard deviation of an endpoint, pixels."""
 _CLOCK_SPREAD, _SYNCHRONOUS_SPREAD = 0.2, 1e-4
 """Standard deviations of residual clock offsets, of unknown and of known delays, seconds."""
 _OWN_FRAME = 0.25
 """Residual delay from which the next frame is tried, frames."""
-_MAX_MARKS, _MARK_PIXELS = 800, 1.5
-"""Floor features; spread of one, pixels: it is located in a plan, where distant ground is stretched."""
+_MAX_MARKS = 800
+"""Number of floor features at most."""
+_MARK_PIXELS = 1.5
+"""Standard deviation of a floor feature, pixels: it is located in a plan, where distant ground is stretched."""
 _STEP_SECONDS = 0.5
 """Duration of a step, within which endpoint errors are correlated, seconds."""
 

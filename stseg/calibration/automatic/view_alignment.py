@@ -13,8 +13,10 @@ import numpy as np
 
 from stseg.arrays import Complexes, Floats, Ints
 
-_GATE, _BASELINE = 0.7, 1.0
-"""Agreement gate, and least distance of the two points of a hypothesis, metres."""
+_GATE = 0.7
+"""Agreement gate, metres."""
+_BASELINE = 1.0
+"""Least distance of the two points of a two-point hypothesis, metres."""
 _HYPOTHESES = 40
 """Number of hypotheses that are verified."""
 _SAMPLES, _SCORED_PAIRS = 1500, 300

@@ -20,10 +20,14 @@ from stseg.calibration.check.box_correspondence import BoxCorrespondences, table
 from stseg.calibration.check.verdict import MIN_PEOPLE, Disagreement, Verdict, judge
 from stseg.geometry import Rig
 
-_MAX_FRAMES, _MAX_DELAY = 80, 1.0
-"""Frames in use, evenly spread; largest stream delay that is tested, seconds."""
-_SWAP_DISPLACEMENT, _LOST_CONFIRMATION = 1.5, 0.6
-"""Displacement, in cells, from which swapped streams are tested; share of the usual confirmations of a lost view."""
+_MAX_FRAMES = 80
+"""Greatest number of frames in use, evenly spread."""
+_MAX_DELAY = 1.0
+"""Largest stream delay that is tested, seconds."""
+_SWAP_DISPLACEMENT = 1.5
+"""Displacement, in cells, from which swapped streams are tested."""
+_LOST_CONFIRMATION = 0.6
+"""Share of the median confirmation rate below which a view counts as lost."""
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,9 @@ from stseg.geometry import Camera, Rig
 
 MIN_PEOPLE = 20
 """Least number of people (a person in a frame counts once) for a statement on a view."""
-_ROUNDS, _DIFFERENCE = 15, 0.01
-"""Rounds of reweighting; step of the finite differences, metres."""
+_ROUNDS = 15
+_DIFFERENCE = 0.01
+"""Step of the finite differences, metres."""
 _FEET_COLUMN, _OCCLUSION_WEIGHT = 2, 0.35
 """Column of the feet, and the weight of a lower edge above them: others and furniture hide feet."""
 _SUSPECTS = 3
