@@ -138,7 +138,7 @@ class Camera:
         return np.asarray(pixel, float) if self.lens is None else self.lens.undistort(pixel)
 
     def rays(self, pixel: Floats) -> Floats:
-        """Directions in the world of what pixels show, float64 (..., 3); P takes them to (u, v, 1)."""
+        """Directions in the world of what pixels show, float64 (..., 3); P[:, :3] takes them to (u, v, 1)."""
         return np.asarray(homogeneous(self.ideal(pixel)) @ np.linalg.inv(self.projection[:, :3]).T)
 
     def sees(self, ground: Floats, height: Floats | float) -> Flags:

@@ -33,8 +33,10 @@ _IMPORT_OF_KERNELS = b"from stseg.kernels.accelerate import"
 _COMPILING_FILES = tuple(
     _PACKAGE / "kernels" / name for name in ("accelerate.py", "cache.py", "checked_files.py", "fast_compile.py")
 )
-_PATIENCE, _PAUSE = 60.0, 0.02
-"""Seconds for which another process that compiles kernels of the same file is waited for, and between two tries."""
+_PATIENCE = 60.0
+"""Time to wait for another process that compiles kernels of the same file, seconds."""
+_PAUSE = 0.02
+"""Time between two tries, seconds."""
 
 
 class KernelFolder:
@@ -107,7 +109,7 @@ def locked(place: str) -> Iterator[None]:
 
 
 def _lock(opened: int) -> None:
-    """Lock an open folder; a process that was stopped, or that is not ours, is not waited for without end."""
+    """Lock an open folder; after `_PATIENCE` go on without, as the other process may have been stopped."""
     for _ in range(round(_PATIENCE / _PAUSE)):
         try:
             fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -118,7 +120,7 @@ def _lock(opened: int) -> None:
 
 @cache
 def folder() -> Path:
-    """The folder of all kernels: the first that is this user's and can be written to; else one of this process."""
+    """The folder of all kernels: the first that is this user's and can be written to; else a temporary one."""
     for place in (_folder_of_environment(), _folder_of_user()):
         if place is not None and _is_usable(place):
             return place
@@ -129,7 +131,7 @@ def folder() -> Path:
 
 @cache
 def source_stamp(path: Path) -> str:
-    """Digest of a file, of the files with kernels or constants that its kernels contain, and of the compiler."""
+    """Digest of a file, of the files that its kernels import, in turn where those have kernels, and of the compiler."""
     sources, waiting = set(_COMPILING_FILES), [path]
     while waiting:
         source = waiting.pop()
@@ -178,7 +180,7 @@ def _folder_of_user() -> Path | None:
 
 
 def _is_usable(place: Path) -> bool:
-    """Whether a folder is this user's alone and has room; others lose the right to write to one of this user's."""
+    """Whether a folder is this user's alone and has room; one of this user's is made private (0700)."""
     try:
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
         if os.name == "posix" and place.stat().st_uid == os.geteuid():

@@ -136,11 +136,11 @@ def fill_sums(views: FrameTerms, sums: Sums) -> None:
     """Add what all views see to sums, 0 before."""
     number, term = len(views.near_person), np.empty(_CELLS_AT_ONCE, np.float32)
     for first in range(0, number, _CELLS_AT_ONCE):
-        part = slice(first, min(first + _CELLS_AT_ONCE, number))
-        weighted, weights, visible = sums.weighted[part], sums.weights[part], sums.shares[part]
+        cells = slice(first, min(first + _CELLS_AT_ONCE, number))
+        weighted, weights, visible = sums.weighted[cells], sums.weights[cells], sums.shares[cells]
         for i in range(len(views.weight)):
             weight, terms = views.weight[i], views.terms[i, 0]
-            levels, shares = views.levels[i, part], views.share[i, part]
+            levels, shares = views.levels[i, cells], views.share[i, cells]
             for c in range(len(levels)):  # a loop of its own, so that the other becomes vector code
                 term[c] = terms[np.uint32(max(levels[c], 0))]
             for c in range(len(levels)):

@@ -264,12 +264,12 @@ class Occupancy:
         edges = edges.clip(0, [width - 1, height - 1] * 2)
         boxes = ViewBoxes(edges, *noise.of(view.score), width, height)
         cells = CellsByPerson.of(near_person, len(people))
-        priors = self._height_prior(np.array([self.height_mean]))[0], self._height_prior(people.height)
+        priors = self._log_height_around(np.array([self.height_mean]))[0], self._log_height_around(people.height)
         fit = CellFit.unfilled(len(self.heights), near_person.size)
         fill_fit(pillars[1], pillars[0], *priors, boxes, owner, cells, fit)
         return fit
 
-    def _height_prior(self, expected: Floats) -> Floats:
+    def _log_height_around(self, expected: Floats) -> Floats:
         """Log-prior of `self.heights` around expected heights (n,), metres; float64 (n, height)."""
         return np.asarray(-0.5 * ((self.heights - expected[:, None]) / self.height_spread) ** 2)
 

@@ -41,7 +41,7 @@ def build_energy(
 
 @wide_kernel
 def fill_cut_unary(log_odds: Singles, most: np.float32, quantum: np.float32, unary: Labels) -> None:
-    """Fill unary (cell,) with log-odds bounded by `most` nats, in quanta; 0 for nan."""
+    """Fill unary (cell,), the gain of an occupied cell, -D: log-odds bounded by `most` nats, in quanta; 0 for nan."""
     for i in range(len(unary)):
         value = log_odds[i]
         value = value if value < most else most if value == value else np.float32(0)

@@ -13,7 +13,7 @@ from checks import REFUSAL_TIME, Command, in_ci, refused
 from recordings import COMMAND, process
 
 from stseg.commands.main import main
-from stseg.errors import FormatError
+from stseg.errors import FormatError, OutputError
 from stseg.io.detections.masks import RunLengths, run_lengths
 from stseg.io.detections.record import Detections, last_numbers
 from stseg.io.detections.source_detections import instance_image, read_source
@@ -54,6 +54,9 @@ def test_foreign_folders_and_links_are_left_alone(tmp_path: Path, refusal: Comma
         (tmp_path / "r.h5.segments").symlink_to(work.path)
         refusal("run", write_rig(tmp_path), "-o", tmp_path / "r.h5")
         assert work.begun
+        (work.path / "begun.json").unlink()  # as before another run has written it
+        refused(OutputError, "another run", WorkFolder(tmp_path / "else" / "q.h5", {}).__enter__)
+        assert work.path.exists()
     rig, folder = write_rig(tmp_path), tmp_path / "q.h5.segments"
     folder.mkdir()
     names = ("thesis.txt", "begun.json", "segment-00000.h5")

@@ -73,10 +73,8 @@ class WorkFolder:
     def __enter__(self) -> Self:
         try:
             self._make()
-            self._lock = _open_own(self.path / "lock")
-            lock(self._lock)
+            self._lock = _locked(self.path / "lock")
         except OSError as error:
-            self.close()
             raise output_error(self.output, error) from error
         try:
             self._begin()
@@ -260,6 +258,17 @@ def _is_deletable(folder: Path) -> bool:
     """Whether a folder holds our mark and else only what a published run leaves; or nothing, where a kill came last."""
     names = {path.name for path in folder.iterdir()}
     return names <= _PUBLISHED_FILES and (not names or is_regular(folder / _MARK))
+
+
+def _locked(path: Path) -> BinaryIO:
+    """A file of ours, locked; OSError where another process has it."""
+    opened = _open_own(path)
+    try:
+        lock(opened)
+    except OSError:
+        opened.close()
+        raise
+    return opened
 
 
 def _open_own(path: Path) -> BinaryIO:

@@ -6,7 +6,7 @@ speaks against it inside, other people's pixels say nothing (they may hide anyth
 probability o is o own and 1 - o background. Less what is the same for all pillars R of the lattice, one view says of
 each
 
-    observations * sum_R (2 o OWN + (1 - o) BACKGROUND) / area of a body of mean size     nats,
+    observations * sum_R (2 o OWN + (1 - o) BACKGROUND) / mean area of these pillars     nats,
 
 the weights those of `stseg.bodies.views`, `observations` the effective number of them in one view.
 
@@ -81,8 +81,8 @@ class _PixelLabels(NamedTuple):
 def _posterior(lattice: Floats, score: Floats, mean: Floats | float, spread: float) -> tuple[Floats, Floats]:
     """Mean and variance of each person's size on the lattice, from log-likelihoods (person, pillar), nats.
 
-    Those of the population, `mean`, which may be a column of one each, and `spread` squared, where all sizes are as
-    likely.
+    Where all sizes are equally likely, those of the population: `mean`, perhaps a column of one each, and `spread`
+    squared.
     """
     is_measured = np.ptp(score, axis=1) > 0
     score = score + log_heavy_tailed((lattice - mean) / spread)

@@ -25,7 +25,7 @@ from stseg.identities.evidence.size_model import evidence
 from stseg.records.tables import KNOWN_PERSON
 
 NO_PAIRS: Ints = np.zeros((0, 2), np.int64)
-"""No pairs."""
+"""Default of `different`."""
 _EVIDENCE_LIMIT = 500.0
 """Most evidence that is told apart from certainty, nats."""
 
@@ -82,13 +82,14 @@ def find_returns(visits: Visits, spread: Floats, least: float, different: Ints =
     `different` int64 (pair, 2) are identities that are known to be two people.
     """
     people, found, chances = _People.of(visits), list[Return](), 0
-    named = {identity: visit for visit, identity in enumerate(visits.identity.tolist())}
-    other = dict[int, set[int]]()
+    visit_of = {identity: visit for visit, identity in enumerate(visits.identity.tolist())}
+    known_different = dict[int, set[int]]()
     for one, two in different.tolist():
-        other.setdefault(named.get(one, -1), set()).add(named.get(two, -1))
-        other.setdefault(named.get(two, -1), set()).add(named.get(one, -1))
+        if one in visit_of and two in visit_of:
+            known_different.setdefault(visit_of[one], set()).add(visit_of[two])
+            known_different.setdefault(visit_of[two], set()).add(visit_of[one])
     for visit in range(len(visits)):
-        away = people.away(visits.first[visit], other.get(visit, set()))
+        away = people.away(visits.first[visit], known_different.get(visit, set()))
         if len(away):
             often = (len(found) + 1) / (chances + 2)
             probability = _probability(visits, visit, people, away, spread, np.log(often / (1 - often) / len(away)))
@@ -115,16 +116,16 @@ def _probability(visits: Visits, visit: int, people: _People, away: Ints, spread
 
 
 def _beside(visits: Visits, visit: int, founders: Ints) -> Ints:
-    """Visits at the time of one of which it is not decided that they are a return."""
+    """Visits that overlap one in time and are not decided to be returns."""
     later = np.arange(visit + 1, np.searchsorted(visits.first, visits.last[visit], "right"))
     return np.concatenate([founders[visits.last[founders] >= visits.first[visit]], later])
 
 
 def _return(visits: Visits, visit: int, person: int, probability: float, people: _People) -> Return:
     frame = int(visits.first[visit])
-    identity, name = visits.identity[[person, visit]].tolist()
+    identity, own_identity = visits.identity[[person, visit]].tolist()
     last = int(people.last[person])
-    return Return(frame, identity, name, probability, frame - last if last >= 0 else None)
+    return Return(frame, identity, own_identity, probability, frame - last if last >= 0 else None)
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,7 @@ def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: F
 def lasting_variance(precision: Floats, information: Floats) -> Floats:
     """Variance of errors that last half a visit, from sums over both halves of each (visit, 2, size); float64 (size,).
 
-    The half of the squared difference of both means, less the errors that are known.
+    Half of the squared difference of both means less their known variances, averaged over visits; at least 0.
     """
     measured = (precision > 0).all(axis=1)
     variance = 1.0 / np.where(precision > 0, precision, 1.0)

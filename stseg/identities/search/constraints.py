@@ -34,20 +34,20 @@ class Constraints:
         return cls(pairs[:, 0], pairs[:, 1], np.arange(len(pairs)) < len(same))
 
     def __add__(self, more: Constraints) -> Constraints:
-        """Both of two."""
+        """The constraints of both."""
         pairs = zip((self.earlier, self.later, self.same), (more.earlier, more.later, more.same), strict=True)
         return Constraints(*(np.concatenate(pair) for pair in pairs))
 
     def where(self, chosen: Flags) -> Constraints:
-        """Some of them."""
+        """The chosen constraints, bool (constraint,)."""
         return Constraints(self.earlier[chosen], self.later[chosen], self.same[chosen])
 
     def renumbered(self, place: Ints) -> Constraints:
-        """The same of rows under other numbers: place (row,) is that of each."""
+        """The same constraints after rows are renumbered: place (row,) is the new number of each, -1 for none."""
         return Constraints(place[self.earlier], place[self.later], self.same)
 
     def among(self) -> Constraints:
-        """Those of which both rows are there, numbered from 0."""
+        """The constraints whose rows both have a number."""
         return self.where((self.earlier >= 0) & (self.later >= 0))
 
     def violated(self, identity: Ints) -> Flags:
@@ -157,7 +157,7 @@ def binding_people(people: BoundPeople, first: int) -> Ints:
 
 @part
 def mark_of(bound: Ints, h: int, binding: Ints) -> int:
-    """A number that differs where hypotheses differ in who some people are; bound (hypothesis, person)."""
+    """A hash of the identities of some people, bound (hypothesis, person): equal where hypotheses agree on them."""
     mark = 0
     for person in binding:
         mark = (mark * 1_000_003 + bound[h, person] + 2) % 2_147_483_647
