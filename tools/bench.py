@@ -11,8 +11,6 @@ Machines and their load differ by more than a change does, so checkouts that are
 compares with the commit of the last stored row. `start` is the CPU time until the first frames are out.
 """
 
-from __future__ import annotations
-
 import csv
 import os
 import subprocess
@@ -73,10 +71,12 @@ def cpu_of_runs(sources: Sequence[Path], rig: Path, output: Path, frames: int) -
     running = [
         subprocess.Popen(
             [sys.executable, "-P", "-c", RUN, *words, f"{output}_{number}.h5"],
-            env=os.environ | {"PYTHONPATH": str(source)}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": str(source)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
         )
         for number, source in enumerate(sources)
-    ]  # fmt: skip
+    ]
     cpu = []
     for source, process in zip(sources, running, strict=True):
         assert process.stderr is not None

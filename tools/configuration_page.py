@@ -3,8 +3,6 @@
 python tools/configuration_page.py
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

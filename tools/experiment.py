@@ -10,8 +10,6 @@ scaling     CPU time of a frame over area, views, people and pixels, with expone
 spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 

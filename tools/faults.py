@@ -7,8 +7,6 @@ A fault is survived if the command ends with a whole output or with one line, no
 and the same command then gives the same datasets, bit for bit. Anything else is lost.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import random

@@ -5,8 +5,6 @@ image of each camera by one pixel, and drops one box, or one frame of a view, in
 perturbed runs share are not scored.
 """
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import dataclass, replace
 from typing import NamedTuple

@@ -9,8 +9,6 @@ camera cell left top right bottom`. The feet (middle of the bottom) give the hom
 is 9.0 cells tall in the one view and 8.2 in the other, so a body of 1.75 m has cells of about 0.20 m.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Commands are written as one types them; $DATA is the folder of data sets, $WORK the folder for what is made.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from stseg.simulation import NAMED

@@ -9,8 +9,6 @@ the table. `--sets none` writes the page from the stored figures. Rendered scene
 after a change to the simulator.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import sys
@@ -26,9 +24,17 @@ from stseg.io.runfile.runs import read_run
 STORE, PAGE = ROOT / "docs" / "results" / "results.csv", ROOT / "docs" / "development" / "results.md"
 ABLATION = STORE.with_name("ablation.csv")
 SCORES = {
-    "MODA": "MODA", "MODP": "MODP", "precision": "precision", "recall": "recall", "MOTA": "MOTA", "IDF1": "IDF1",
-    "HOTA": "HOTA", "switches": "IDSW", "fragments": "Frag", "false_tracks": "false_tracks",
-}  # fmt: skip
+    "MODA": "MODA",
+    "MODP": "MODP",
+    "precision": "precision",
+    "recall": "recall",
+    "MOTA": "MOTA",
+    "IDF1": "IDF1",
+    "HOTA": "HOTA",
+    "switches": "IDSW",
+    "fragments": "Frag",
+    "false_tracks": "false_tracks",
+}
 """Columns of the table, and their names in the output of `stseg evaluate --json`."""
 COLUMNS = ("set", "variant", "frames", *SCORES, "tracks", "error_m", "commit", "run", "evaluate")
 _OTHERS = ("kalman", "particles", "belief")

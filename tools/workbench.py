@@ -1,7 +1,5 @@
 """Where data sets lie and results go, and how the tools run commands there."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import shlex

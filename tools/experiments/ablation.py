@@ -6,8 +6,6 @@ A line is the mean change of the scores where a mechanism is off, with the stand
 compared with the run of the same perturbation with everything on. Lines of other sets and mechanisms stay.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor

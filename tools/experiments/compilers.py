@@ -9,8 +9,6 @@ frames of the recording `uu4` are tracked where DATA holds it, and else a simula
 runs differ. CPU seconds are printed beside: with an empty NUMBA_CACHE_DIR they are those of a first run.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -32,8 +30,10 @@ def start(python: str, words: list[str], **environment: str) -> subprocess.Popen
     """Start a command of stseg by an interpreter, without a search for garbage: it is a tenth of compiling."""
     return subprocess.Popen(
         [python, "-c", f"import gc; gc.disable(); {RUN}", *words],
-        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
 
 
 def finish(name: str, process: subprocess.Popen[bytes]) -> None:

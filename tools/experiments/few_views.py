@@ -9,8 +9,6 @@ WORK holds uu4.toml, cmc2.csv, cmc2.toml, cmc2_fairmot.toml, wildtrack.csv and w
 leaves them. Of a rig with many cameras some choices are tried, evenly among all.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from itertools import combinations

@@ -5,8 +5,6 @@
 Crowds are chaotic: one run says little.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context

@@ -8,8 +8,6 @@ people's places. `uu4` lends its lenses; the board on its floor places its camer
 a pixel, and ground 4 m away by 0.1 to 0.3 m.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain
@@ -106,11 +104,21 @@ def room(number: int) -> Seen:
     side, tall, k1 = lots.uniform(4.5, 6.5), 1.7 + 0.067 * np.clip(lots.normal(), -2, 2), lots.uniform(-0.36, 0.0)
     people, views, width = (int(lots.integers(*bounds)) for bounds in ((1, 5), (3, 6), (480, 641)))
     spec = SceneSpec(
-        f"room {number}", people, (side, side), 36.0, 5.0, views, camera_distance=0.72 * side + lots.uniform(0.3, 1.5),
-        camera_height=lots.uniform(2.0, 3.8), field_of_view=lots.uniform(55.0, 85.0), size=(width, 3 * width // 4),
-        distortion=(k1, -k1 * lots.uniform(0.0, 0.2)), heights=(tall - 0.12, tall + 0.12), kinds=("masks",),
+        f"room {number}",
+        people,
+        (side, side),
+        36.0,
+        5.0,
+        views,
+        camera_distance=0.72 * side + lots.uniform(0.3, 1.5),
+        camera_height=lots.uniform(2.0, 3.8),
+        field_of_view=lots.uniform(55.0, 85.0),
+        size=(width, 3 * width // 4),
+        distortion=(k1, -k1 * lots.uniform(0.0, 0.2)),
+        heights=(tall - 0.12, tall + 0.12),
+        kinds=("masks",),
         seed=number,
-    )  # fmt: skip
+    )
     film, wider = SceneFilm(spec, [Spoil("shadows", 0.05)] * (number % 3 == 0)), lots.integers(-2, 3, views)
     corner, size = lots.integers(0, width // 20, (views, 2)), (width - width // 20, 3 * width // 4 - width // 20)
     ends, places = [list[tuple[int, Floats]]() for _ in wider], list[Floats]()

@@ -9,8 +9,6 @@ Inputs (rigs, films) are made by BASE. Every dataset and every column of every t
 differs.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

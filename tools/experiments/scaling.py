@@ -64,9 +64,16 @@ class Shown:
 def crowd(people: int, width: int, views: int) -> Shown:
     """A crowd on 10 m x 10 m."""
     spec = replace(
-        NAMED["easy"], area=(10.0, 10.0), camera_distance=9.0, people=people, cameras=views, stay=60.0,
-        seconds=(_READY + _MEASURED) / 10, frame_rate=10.0, size=(width, width * 3 // 4),
-    )  # fmt: skip
+        NAMED["easy"],
+        area=(10.0, 10.0),
+        camera_distance=9.0,
+        people=people,
+        cameras=views,
+        stay=60.0,
+        seconds=(_READY + _MEASURED) / 10,
+        frame_rate=10.0,
+        size=(width, width * 3 // 4),
+    )
     film = SceneFilm(spec)
     empty = list(film.empty())[-_EMPTY:]
     return Shown(
