@@ -43,14 +43,14 @@ _PICTURES = 8
 """Pictures that are decoded before they are searched."""
 
 
-class Detector(Protocol):
+class BoxDetector(Protocol):
     """Finds people in colour pictures."""
 
     def detect(self, picture: Bytes) -> Boxes:
         """Boxes in a picture, uint8 (v, u, 3) in the order blue, green, red."""
 
 
-def make_detector(source: Source) -> Detector:
+def make_detector(source: Source) -> BoxDetector:
     """The detector that a source names; raises InputError where it is none, or has none of the classes."""
     assert source.detector is not None
     least = source.least_score or None

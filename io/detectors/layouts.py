@@ -20,7 +20,7 @@ _STRIDES = ((8, 16, 32), (8, 16, 32, 64))
 
 
 @dataclass(frozen=True)
-class Candidates:
+class ScoredBoxes:
     """Boxes of one picture before a choice.
 
     Attributes
@@ -44,7 +44,7 @@ class Layout:
     name, shapes
         For messages.
     decode
-        Candidates of the outputs and the size (width, height) of the input; None where the outputs have other shapes.
+        Boxes of the outputs and the size (width, height) of the input; None where the outputs have other shapes.
     fit, rgb, largest
         The input: its place, the order of its channels (blue, green, red where not `rgb`), and its value of white.
     suppressed
@@ -53,7 +53,7 @@ class Layout:
 
     name: str
     shapes: str
-    decode: Callable[[Outputs, tuple[int, int]], Candidates | None]
+    decode: Callable[[Outputs, tuple[int, int]], ScoredBoxes | None]
     fit: Fit = "centre"
     rgb: bool = True
     largest: float = 1.0
@@ -65,32 +65,32 @@ def recognise(outputs: Outputs, size: tuple[int, int]) -> Layout | None:
     return next((layout for layout in LAYOUTS if layout.decode(outputs, size) is not None), None)
 
 
-def _yolo8(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:
+def _yolo8(outputs: Outputs, size: tuple[int, int]) -> ScoredBoxes | None:
     """[1, 4 + C, N]: centre and size, class scores; of segmentation also the weights of masks, which are left out."""
     rows, masks = _single(outputs)
     if rows is None or rows.shape[0] < 5 + masks or _strides(rows.shape[1], size) is None:
         return None
-    return Candidates(_from_centres(rows[:4].T), rows[4 : len(rows) - masks].T)
+    return ScoredBoxes(_from_centres(rows[:4].T), rows[4 : len(rows) - masks].T)
 
 
-def _yolo5(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:
+def _yolo5(outputs: Outputs, size: tuple[int, int]) -> ScoredBoxes | None:
     """[1, N, 5 + C], three predictions a square: centre and size, objectness, class scores."""
     rows, masks = _single(outputs)
     if rows is None or rows.shape[1] < 6 + masks or _strides(rows.shape[0] / 3, size) is None:
         return None
     score = rows[:, 4:5] * rows[:, 5 : rows.shape[1] - masks]
-    return Candidates(_from_centres(rows[:, :4]), score)
+    return ScoredBoxes(_from_centres(rows[:, :4]), score)
 
 
-def _yolo6(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:
+def _yolo6(outputs: Outputs, size: tuple[int, int]) -> ScoredBoxes | None:
     """[1, N, 5 + C], one prediction a square, objectness 1 throughout."""
     rows, _ = _single(outputs)
     if rows is None or rows.shape[1] < 6 or _strides(rows.shape[0], size) is None or (rows[:, 4] != 1).any():
         return None
-    return Candidates(_from_centres(rows[:, :4]), rows[:, 5:])
+    return ScoredBoxes(_from_centres(rows[:, :4]), rows[:, 5:])
 
 
-def _yolox(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:
+def _yolox(outputs: Outputs, size: tuple[int, int]) -> ScoredBoxes | None:
     """[1, N, 5 + C], one prediction a square: offsets from the square and logarithms of sizes, in its sides.
 
     Some exports have the decoding inside: their centres lie near the squares.
@@ -103,10 +103,10 @@ def _yolox(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:
     boxes = rows[:, :4]
     if np.abs(boxes[:, :2]).mean() < np.abs(boxes[:, :2] - corner * side).mean():
         boxes = np.concatenate([(boxes[:, :2] + corner) * side, np.exp(np.minimum(boxes[:, 2:], 20)) * side], axis=1)
-    return Candidates(_from_centres(boxes), rows[:, 4:5] * rows[:, 5:])
+    return ScoredBoxes(_from_centres(boxes), rows[:, 4:5] * rows[:, 5:])
 
 
-def _suppressed(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:  # noqa: ARG001
+def _suppressed(outputs: Outputs, size: tuple[int, int]) -> ScoredBoxes | None:  # noqa: ARG001
     """[1, N, 6]: corners, score, class; or [N, 7]: picture, corners, class, score."""
     rows, *more = outputs.values()
     if not more and rows.ndim == 3 and rows.shape[::2] == (1, 6):
@@ -115,10 +115,10 @@ def _suppressed(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:  
         rows = rows[:, [1, 2, 3, 4, 6, 5]]
     else:
         return None
-    return Candidates(rows[:, :4], _by_class(rows[:, 4], rows[:, 5]))
+    return ScoredBoxes(rows[:, :4], _by_class(rows[:, 4], rows[:, 5]))
 
 
-def _lists(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:  # noqa: ARG001
+def _lists(outputs: Outputs, size: tuple[int, int]) -> ScoredBoxes | None:  # noqa: ARG001
     """Three outputs: corners [1, N, 4], and the score and class [1, N] of each, scores no whole numbers."""
     arrays = [array[0] for array in outputs.values() if array.ndim in (2, 3) and len(array) == 1]
     boxes = [array for array in arrays if array.ndim == 2 and array.shape[1] == 4]
@@ -126,10 +126,10 @@ def _lists(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:  # noq
     if len(outputs) != 3 or len(boxes) != 1 or len(flat) != 2:
         return None
     score, number = sorted(flat, key=lambda array: bool((array == array.round()).all()))
-    return Candidates(boxes[0], _by_class(score, number))
+    return ScoredBoxes(boxes[0], _by_class(score, number))
 
 
-def _rtdetr(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:
+def _rtdetr(outputs: Outputs, size: tuple[int, int]) -> ScoredBoxes | None:
     """Centres and sizes in shares of the input, and class scores or their logits: [1, N, 4] and [1, N, C], or one."""
     arrays = [array[0] for array in outputs.values() if array.ndim == 3 and len(array) == 1]
     if len(arrays) == 1 and len(outputs) == 1 and arrays[0].shape[1] > 4:
@@ -141,7 +141,7 @@ def _rtdetr(outputs: Outputs, size: tuple[int, int]) -> Candidates | None:
         return None
     if score.min(initial=0) < 0 or score.max(initial=0) > 1:
         score = 1 / (1 + np.exp(-score))
-    return Candidates(_from_centres(boxes) * np.tile(size, 2), score)
+    return ScoredBoxes(_from_centres(boxes) * np.tile(size, 2), score)
 
 
 LAYOUTS = (

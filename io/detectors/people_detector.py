@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
 from stseg.errors import FormatError
-from stseg.io.detectors.layouts import LAYOUTS, Candidates, recognise
+from stseg.io.detectors.layouts import LAYOUTS, ScoredBoxes, recognise
 from stseg.io.detectors.networks import Network, describe
 from stseg.io.detectors.picture_fit import fit_picture
 from stseg.io.untrusted import limits
@@ -78,7 +78,7 @@ class OnnxDetector:
         corners = np.clip(corners, 0, size)
         return Boxes(np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1), score)
 
-    def _chosen(self, found: Candidates) -> tuple[Floats, Floats]:
+    def _chosen(self, found: ScoredBoxes) -> tuple[Floats, Floats]:
         """Corners and scores of one candidate for each person."""
         columns = self._wanted[self._wanted < found.score.shape[1]]
         score = found.score[:, columns].max(axis=1, initial=0.0)
