@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.baselines.huang_wang_2012.mean_shift import _KERNEL_EXTENT, _MODE_RADIUS, _REST_STEP, _STEP_LIMIT
-from stseg.baselines.huang_wang_2012.pillar_strips import Pillars
+from stseg.baselines.huang_wang_2012.pillar_strips import PillarStrips
 from stseg.geometry import Camera
 
 _FINE, _BITS, _DISCS, _POINTS = 4, 6, 30, 32
@@ -20,7 +20,7 @@ def nearest(edge: float) -> int:
     return math.floor(edge + 0.5)
 
 
-def region(pillars: Pillars, place: int, heights: int, width: float, pad: int, shape: tuple[int, int]) -> Flags:
+def region(pillars: PillarStrips, place: int, heights: int, width: float, pad: int, shape: tuple[int, int]) -> Flags:
     """M_i of the pillar that reaches to the given one of the heights, on a map (v, u) with a margin all around."""
     mask = np.zeros((shape[0] + 2 * pad, shape[1] + 2 * pad), bool)
     for k in range(pillars.base + heights + 1):
@@ -36,7 +36,7 @@ def region(pillars: Pillars, place: int, heights: int, width: float, pad: int, s
 
 
 def chance(
-    likelihood: Singles, pillars: Pillars, place: int, widths: Floats, height_share: Floats, width_share: Floats,
+    likelihood: Singles, pillars: PillarStrips, place: int, widths: Floats, height_share: Floats, width_share: Floats,
     outside: float, pad: int,
 ) -> float:  # fmt: skip
     """p(F_i | X): the mean of F_i over each pillar's region (HW12 eqs 2 to 6); nan where the view sees none of it."""

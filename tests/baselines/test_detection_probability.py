@@ -14,7 +14,7 @@ from strategies import BARREL, cameras
 from stseg.arrays import Floats, Singles
 from stseg.baselines.huang_wang_2012.detection_probability import DetectionProbability, fill_chance
 from stseg.baselines.huang_wang_2012.mean_shift import fill_modes, modes
-from stseg.baselines.huang_wang_2012.pillar_strips import Pillars
+from stseg.baselines.huang_wang_2012.pillar_strips import PillarStrips
 from stseg.config import BodyConfig, ProposalConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
@@ -46,7 +46,7 @@ def maps(draw: st.DrawFn) -> Singles:
 
 
 @st.composite
-def strips(draw: st.DrawFn) -> Pillars:
+def strips(draw: st.DrawFn) -> PillarStrips:
     """One pillar of a few strips, about a small map: upright or lying, from either end."""
     count = draw(st.integers(2, 5))
     lengths = draw(st.lists(numbers(0.0, 4.0), min_size=count, max_size=count))
@@ -55,17 +55,17 @@ def strips(draw: st.DrawFn) -> Pillars:
     half = draw(st.lists(numbers(0.5, 12.0), min_size=count, max_size=count))
     upright, base = np.array([draw(st.booleans())]), draw(st.integers(0, count - 1))
     one, two, three = (np.array([part], np.float32) for part in (edge, middle, half))
-    return Pillars(upright, one, two, three, base)
+    return PillarStrips(upright, one, two, three, base)
 
 
 EDGE, MIDDLE, HALF = (np.array([part], np.float32) for part in ([0, 0, 1], [0, -0.375], [1, 0.5]))
-NARROW = Pillars(np.array([False]), EDGE, MIDDLE, HALF, 0)
+NARROW = PillarStrips(np.array([False]), EDGE, MIDDLE, HALF, 0)
 """A pillar whose widest form, rounded to pixels, misses an image that a narrower one meets."""
 
 
 @example(np.ones((3, 3), np.float32), NARROW, 0.5)
 @drawn(60, maps(), strips(), numbers(0.01, 0.5))
-def test_the_kernel_is_the_definition(likelihood: Singles, pillars: Pillars, outside: float) -> None:
+def test_the_kernel_is_the_definition(likelihood: Singles, pillars: PillarStrips, outside: float) -> None:
     rng, widths = np.random.default_rng(0), np.array([0.2, 0.3, 0.4])
     height_share, width_share = (rng.dirichlet(np.ones(n)) for n in (pillars.middle.shape[1] - pillars.base, 3))
     sums = np.empty((likelihood.shape[0] + 1, likelihood.shape[1] + 1), np.uint32)
@@ -110,7 +110,7 @@ def test_strips_cover_what_the_pillar_does(view: str) -> None:
     large = Camera("large", (512, 384), fine @ small.ground, fine @ small.vertical)
     camera = small if small.lens else large
     places = np.array([[0.0, 0.0], [1.2, 0.8], [-0.7, 1.1], [1.3, -0.9]])
-    pillars = Pillars.of(camera, places, HEIGHTS, 0.3)
+    pillars = PillarStrips.of(camera, places, HEIGHTS, 0.3)
     shares = []
     for i, place in enumerate(places):
         for h, height in enumerate(HEIGHTS):
@@ -125,7 +125,7 @@ def test_strips_cover_what_the_pillar_does(view: str) -> None:
 @drawn(25, cameras(lenses=False))
 def test_a_pillar_stands_where_the_homographies_say(camera: Camera) -> None:
     # On the axis, at each end of the strips above the caps, whatever the camera.
-    pillars = Pillars.of(camera, np.zeros((1, 2)), HEIGHTS, 1e-9)
+    pillars = PillarStrips.of(camera, np.zeros((1, 2)), HEIGHTS, 1e-9)
     assume(not np.isnan(pillars.edge[0, 0]))
     for k, height in ((0, 0.0), (-3, HEIGHTS[0]), (-1, HEIGHTS[2])):
         column = camera.plane(float(height)) @ [0.0, 0.0, 1.0]

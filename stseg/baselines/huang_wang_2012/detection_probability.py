@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Singles
-from stseg.baselines.huang_wang_2012.pillar_strips import Pillars
+from stseg.baselines.huang_wang_2012.pillar_strips import PillarStrips
 from stseg.config import BodyConfig, ProposalConfig
 from stseg.errors import SourceError
 from stseg.geometry import Rig
@@ -61,7 +61,7 @@ class DetectionProbability:
         self.widths, self.width_share = _lattice(body.width_mean, body.width_spread, config.body_sizes)
         self.steps = list(steps or [1] * len(rig.cameras))
         self.pillars = [
-            Pillars.of(camera, flat, self.heights, body.width_mean, step)
+            PillarStrips.of(camera, flat, self.heights, body.width_mean, step)
             for camera, step in zip(rig.cameras, self.steps, strict=True)
         ]
 
@@ -90,7 +90,7 @@ class DetectionProbability:
                 total += self.view_log_ratio(self.chance(pillars, soft_map))
         return total.reshape(self.ground.shape[:2])
 
-    def chance(self, pillars: Pillars, soft_map: Singles) -> Floats:
+    def chance(self, pillars: PillarStrips, soft_map: Singles) -> Floats:
         """p(F_i | X) of one view (eq. 6), float64 (place,); nan where it does not see the pillar."""
         sums = np.empty((soft_map.shape[0] + 1, soft_map.shape[1] + 1), np.uint32)
         fill_summed_area(soft_map, 0, 0, sums)
@@ -154,7 +154,7 @@ def fill_chance(
     sums : uint32 (v + 1, u + 1)
         Summed-area table of F_i in levels of 1 / TOP; see `stseg.geometry.summed_area`.
     upright, edge, middle, half, base
-        See `stseg.baselines.huang_wang_2012.pillar_strips.Pillars`.
+        See `stseg.baselines.huang_wang_2012.pillar_strips.PillarStrips`.
     widths, width_share, height_share : float64 (r,), (r,), (h,)
         The lattice's widths, metres, and the prior probabilities of its widths and heights.
     outside

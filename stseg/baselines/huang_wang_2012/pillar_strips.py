@@ -29,7 +29,7 @@ _DISTANCE = 0.05
 
 
 @dataclass(frozen=True)
-class Pillars:
+class PillarStrips:
     """Strips of the pillars of one view.
 
     Image coordinates are those of edges, not of pixel centres: a map pixel i spans i .. i + 1.
@@ -57,8 +57,8 @@ class Pillars:
     @classmethod
     def of(
         cls, camera: Camera, ground: Floats, heights: Floats, width: float, step: int = 1, strips: int = STRIPS
-    ) -> Pillars:
-        """Pillars of a view.
+    ) -> PillarStrips:
+        """The pillars of a view.
 
         Parameters
         ----------
