@@ -118,6 +118,7 @@ def fill_fit(
 
 @part
 def _add_fit(log_fit: np.float32, h: int, cell: int, fit: CellFit) -> None:
+    """Add the log-likelihood of a box at a height of a cell; a cell without any gets a column of -inf first."""
     if not fit.found[cell]:
         fit.found[cell] = True
         for other in range(len(fit.best)):

@@ -1,5 +1,7 @@
 """Motion field of ground cells, along which edges in time run."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Labels
@@ -14,8 +16,11 @@ def same_tracks(one: Ints, other: Ints) -> tuple[Ints, Ints]:
     return first[order], second[order]
 
 
-PlacedTracks = tuple[Floats, Ints]
-"""Places of the detections of a frame, float64 (n, 2), metres, and their tracks, int64 (n,)."""
+class PlacedTracks(NamedTuple):
+    """Detections of a frame: places float64 (n, 2), metres, and their tracks int64 (n,)."""
+
+    ground: Floats
+    track: Ints
 
 
 def motion_field(now: PlacedTracks, then: PlacedTracks, reach: float, cell: float, ground: Floats) -> Ints:
@@ -25,11 +30,11 @@ def motion_field(now: PlacedTracks, then: PlacedTracks, reach: float, cell: floa
     around its place, `cell` the side of a cell, and `ground` float64 (y, x, 2) the centres of the cells, all in metres.
     """
     motion = np.zeros(ground.shape, np.int64)
-    first, second = same_tracks(now[1], then[1])
+    first, second = same_tracks(now.track, then.track)
     if not len(first):
         return motion
-    start = now[0][first]
-    moved = np.rint((then[0][second] - start) / cell).astype(np.int64)
+    start = now.ground[first]
+    moved = np.rint((then.ground[second] - start) / cell).astype(np.int64)
     nearest = nearest_person(ground, start, reach)
     motion[nearest >= 0] = moved[nearest[nearest >= 0]][:, ::-1]
     return motion

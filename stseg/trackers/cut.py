@@ -24,7 +24,7 @@ from stseg.records.sparse_labels import SparseLabels
 from stseg.records.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_labelling import WindowDetections, WindowLabels, label_cells
-from stseg.segmentation.cell_motion import motion_field, same_tracks
+from stseg.segmentation.cell_motion import PlacedTracks, motion_field, same_tracks
 from stseg.segmentation.cut_energy import build_energy
 from stseg.segmentation.label_energy import BodyShape
 from stseg.segmentation.patches import GroundPatches, mark_places, people_squares
@@ -158,7 +158,7 @@ class CutTracker:
 
     def _energy(self, frames: list[TrackedFrame], patches: GroundPatches, log_odds: Singles) -> GridEnergy:
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
-        placed = [(one.fused.people.ground, one.tracks) for one in frames]
+        placed = [PlacedTracks(one.fused.people.ground, one.tracks) for one in frames]
         motion = [motion_field(*pair, reach, grid.cell, patches.ground) for pair in pairwise(placed)]
         steps = np.array(motion, np.int64).reshape(-1, *patches.place.shape, 2)
         successor, present = patches.successors(steps), patches.place >= 0

@@ -12,7 +12,7 @@ from stseg.geometry.nearest_person import nearest_person
 from stseg.records.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_kernels import fill_centroids, fill_ground_labels
 from stseg.segmentation.blobs import find_blobs
-from stseg.segmentation.cell_motion import motion_field
+from stseg.segmentation.cell_motion import PlacedTracks, motion_field
 from stseg.segmentation.patches import GroundPatches
 
 _FAINT = 1e-6
@@ -34,16 +34,16 @@ GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 
 
 def test_cells_near_a_person_move_with_them_if_they_do() -> None:
-    now = np.array([[0.55, 0.55], [1.45, 0.95]])
-    then = np.array([[1.25, 0.85], [0.85, 0.45]])
-    motion = motion_field((now, np.array([4, 7])), (then, np.array([7, 4])), 0.25, GRID.cell, GRID.ground)
+    now = PlacedTracks(np.array([[0.55, 0.55], [1.45, 0.95]]), np.array([4, 7]))
+    then = PlacedTracks(np.array([[1.25, 0.85], [0.85, 0.45]]), np.array([7, 4]))
+    motion = motion_field(now, then, 0.25, GRID.cell, GRID.ground)
     assert motion[5, 5].tolist() == [-1, 3] and motion[9, 14].tolist() == [-1, -2]
     assert motion[6, 6].tolist() == [-1, 3] and not motion[0, 0].any()
-    away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - now, -1, 0)).min(2)
+    away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - now.ground, -1, 0)).min(2)
     np.testing.assert_array_equal(motion.any(2), away <= 0.25)
     for first, second in (([3], []), ([3], [9]), ([], [3])):
-        here = np.full((len(first), 2), 0.55), np.array(first, np.int64)
-        there = np.full((len(second), 2), 1.0), np.array(second, np.int64)
+        here = PlacedTracks(np.full((len(first), 2), 0.55), np.array(first, np.int64))
+        there = PlacedTracks(np.full((len(second), 2), 1.0), np.array(second, np.int64))
         motion = motion_field(here, there, 0.3, GRID.cell, GRID.ground)
         assert motion.shape == (15, 20, 2) and not motion.any()
 

@@ -30,7 +30,6 @@ from stseg.io.recording.video.ffmpeg import read_frame_rate, read_video_size
 
 Distance = tuple[str, float, float, float, float, float]
 """A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""
-Frames = FrameSpan
 _UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
