@@ -98,10 +98,10 @@ def require_outputs(
     output: Path | None, pictures: Path | None, video: Path | None, frames: str | None, overwrite: bool, inputs: Inputs
 ) -> None:
     """Refuse outputs that cannot be written and options without effect, before any work."""
-    if output is None and video is None:
-        raise ConfigError("command line", "", "nothing to write", "-o REPORT.html, or --video FILM.webm")
     if output is None and pictures is not None:
         raise ConfigError("command line", "--pictures", pictures, "-o REPORT.html with it")
+    if output is None and video is None:
+        raise ConfigError("command line", "", "nothing to write", "-o REPORT.html, or --video FILM.webm")
     if video is None and frames is not None:
         raise ConfigError("command line", "--frames", frames, "--video FILM.webm with it")
     for path in (output, video):
