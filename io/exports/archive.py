@@ -95,7 +95,7 @@ def _require_rows(connection: Any, counts: Mapping[str, int]) -> None:
 
 
 def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:
-    run.require_fit()
+    run.require_consistency()
     name, file = printable(run.path.stem), printable(str(run.path))
     rate, grid = run.frame_rate, run.recording.rig.grid
     seconds, people = len(run.frames) / rate, len(run.trajectory) / max(len(run.frames), 1)

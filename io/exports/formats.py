@@ -70,7 +70,7 @@ def write_tracks(to: str, path: Path, run: Run) -> None:
 
     FormatError where the run's tables do not fit each other; OSError where rows are missing in the file.
     """
-    run.require_fit()
+    run.require_consistency()
     try:
         FORMATS[to].write(path, run)
         found, rows = ROW_COUNTS[to](path), len(getattr(run, FORMATS[to].rows))

@@ -11,7 +11,7 @@ from stseg.config import BodyConfig, DetectionConfig
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
 from stseg.records.predicted_tracks import PredictedTracks, no_tracks
-from stseg.records.sizes import Sizes, log_heavy_tailed
+from stseg.records.sizes import Sizes, log_heavy_tailed, log_population_height
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Prior:
 
     def log_height(self, heights: Floats) -> Floats:
         """Log prior density of heights, metres, beside that of the mean height: nats, float64 (n,)."""
-        return log_heavy_tailed((heights - self.body.height_mean) / self.body.height_spread)
+        return log_population_height(heights, self.body)
 
     def log_size(self, heights: Floats, widths: Floats) -> Floats:
         """Log prior density of heights and widths, metres, beside that of the means: nats, float64 (n,)."""

@@ -82,7 +82,7 @@ class Session:
         """From now on fuse evidence, and cut windows, in a thread each while detection goes on."""
         self._fusion = fusion
         if isinstance(self._tracker, CutTracker):
-            self._tracker.submit = lambda solution: cuts.submit(self._timed, solution)
+            self._tracker.solve_by(lambda solution: cuts.submit(self._timed, solution))
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
         """The foreground of all views; to be called once for each frame set, in the order of time."""

@@ -176,7 +176,7 @@ def resumable(folder: WorkFolder, reporter: Reporter) -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        if number := len(folder.segments()):
+        if number := len(folder.whole_segments()):
             reporter.note(f"{number} finished segments are kept in {folder.path}; the same command goes on from there")
         else:
             folder.remove()
@@ -199,7 +199,7 @@ def _indexed(recording: Recording, folder: WorkFolder, reporter: Reporter) -> St
 
 def _make_segments(job: Job, folder: WorkFolder, workforce: Workforce, reporter: Reporter) -> list[FinishedSegment]:
     """All segments of a job in the order of time; the missing ones are made."""
-    plan, finished = job.segments(), folder.segments()
+    plan, finished = job.segments(), folder.whole_segments()
     for begin, end in job.gaps():
         reporter.note(f"no camera shows anything in frames {begin} to {end - 1}: a gap, at which all tracks end")
     if not plan:

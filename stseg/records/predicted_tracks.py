@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.config import BodyConfig
-from stseg.records.sizes import Sizes, log_heavy_tailed
+from stseg.records.sizes import Sizes, log_population_height
 
 PLACE_RESOLUTION = 0.1
 """s: resolution of places in one frame, metres (standard deviation)."""
@@ -60,7 +60,7 @@ class PredictedTracks:
         variance = self.sizes.height_variance
         off = height[:, None] - self.sizes.height
         tall = -0.5 * off**2 / variance + np.log(body.height_spread / np.sqrt(variance))
-        population = log_heavy_tailed((height - body.height_mean) / body.height_spread)
+        population = log_population_height(height, body)
         squares = _squares(ground[:, None] - self.ground, self._precision)
         shape = np.maximum(tall - population[:, None], LEAST_HEIGHT_RATIO)
         return np.asarray(self.existence - birth_log_odds + self._concentration - 0.5 * squares + shape)

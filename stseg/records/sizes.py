@@ -95,6 +95,11 @@ def log_heavy_tailed(deviation: Floats) -> Floats:
     return np.where(away < _TAIL, gaussian, -tail)
 
 
+def log_population_height(height: Floats, body: BodyConfig) -> Floats:
+    """Log density of heights in the population, metres, beside that of the mean height: nats."""
+    return log_heavy_tailed((height - body.height_mean) / body.height_spread)
+
+
 _LEAST_PRECISION = 1e-6
 """Precision of an empty measurement, one over square metres."""
 

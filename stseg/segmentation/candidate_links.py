@@ -14,7 +14,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, MotionConfig
 from stseg.kernels.accelerate import kernel
 from stseg.records.predicted_tracks import EXISTENCE_DECAY, LEAST_HEIGHT_RATIO, PLACE_RESOLUTION
-from stseg.records.sizes import log_heavy_tailed
+from stseg.records.sizes import log_population_height
 from stseg.segmentation.label_energy import PLACE_GATE
 
 _LINKS_PER_CANDIDATE = 32
@@ -89,7 +89,7 @@ class LinkModel:
         """Log-ratio of a height as the continuation of another against the population, nats."""
         spread, error = self.body.height_spread, self.body.height_spread / 2
         off = found.height[end] - found.height[start]
-        population = log_heavy_tailed((found.height[end] - self.body.height_mean) / spread)
+        population = log_population_height(found.height[end], self.body)
         ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 - population
         return np.asarray(np.maximum(ratio, LEAST_HEIGHT_RATIO))
 

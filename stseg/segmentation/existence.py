@@ -26,7 +26,7 @@ from stseg.config import BodyConfig, DetectionConfig
 from stseg.graphcut.grid_energy import QUANTUM
 from stseg.graphcut.qpbo import QuadraticEnergy, QuadraticMinimum, minimise
 from stseg.records.border import Border
-from stseg.records.sizes import log_heavy_tailed
+from stseg.records.sizes import log_population_height
 from stseg.segmentation.candidate_links import LinkModel, Links, WindowCandidates
 from stseg.segmentation.paths import best_paths, path_marginals
 
@@ -76,7 +76,7 @@ class ExistenceModel:
         inside = self.detection.birth_cost * self.border.inside(found.ground, self.detection.border_width)
         birth = np.where(found.frame == 0, 0.0, inside)
         death = np.where(found.frame == found.frame.max(), 0.0, inside)
-        tall = log_heavy_tailed((found.height - self.body.height_mean) / self.body.height_spread)
+        tall = log_population_height(found.height, self.body)
         return found.evidence + self.detection.prior_log_odds + tall - birth - death, birth, death
 
     def _exclusions(self, found: WindowCandidates) -> Exclusions:

@@ -56,7 +56,7 @@ def measure(
     """
     found = run_of(run)
     if output is not None:
-        found.require_fit()
+        found.require_consistency()
     rig, areas = found.recording.rig, read_areas(found, zones, lines)
     measures = measure_tracks(found.trajectory, found.frames, found.frame_rate, rig.grid, areas)
     if output is not None:

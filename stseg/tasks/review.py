@@ -59,7 +59,7 @@ def write_review(run_file: Path, output: Path, *, most: int, camera_images: bool
     """
     run = read_run(run_file)
     require_output(output, overwrite, Inputs(run.files))
-    run.require_fit()
+    run.require_consistency()
     doubts = [one for one in doubtful_decisions(run) if one.chance >= _LEAST_CHANCE][:most]
     frames = sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)})
     views = read_views(run.recording, frames) if camera_images and doubts else {}

@@ -37,15 +37,12 @@ from stseg.tracking.windows.tracklets import form_tracklets
 from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
 from stseg.tracking.windows.windows import ENDLESS, LONGEST, Window, windows
 
+Submit = Callable[[Callable[[], Commit]], Future[Commit]]
+"""Begins the solution of a window."""
+
 
 class CutTracker:
-    """Tracks by the minimum cut of overlapping windows; see `TrackingMethod`.
-
-    Attributes
-    ----------
-    submit
-        Has windows solved one after the other, perhaps in another thread while frames are added.
-    """
+    """Tracks by the minimum cut of overlapping windows; see `TrackingMethod`."""
 
     final: ClassVar[bool] = False
 
@@ -62,8 +59,12 @@ class CutTracker:
         self.first = self.committed = first
         self.coming = windows(rig.frame_rate, config.tracking, first, ENDLESS)
         self.window = next(self.coming)
-        self.submit: Callable[[Callable[[], Commit]], Future[Commit]] = _done
+        self._submit: Submit = _done
         self._solving = deque[Future[Commit]]()
+
+    def solve_by(self, submit: Submit) -> None:
+        """From now on have windows solved by `submit`, one after the other, perhaps in another thread meanwhile."""
+        self._submit = submit
 
     def predict(self, frame: int) -> PredictedTracks | None:
         """Predictions of all tracks for a frame; None for the first."""
@@ -100,7 +101,7 @@ class CutTracker:
         first, stop = window.solve_first - self.context, window.solve_stop + self.context
         around = [one for one in self.open_frames if first <= one.fused.frame < stop]
         self.committed = window.commit_stop
-        self._solving.append(self.submit(partial(self._solve, window, around)))
+        self._solving.append(self._submit(partial(self._solve, window, around)))
 
     def _solved(self, most: int) -> list[Commit]:
         """The next windows that are solved; waits until at most so many are not."""

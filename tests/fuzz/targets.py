@@ -149,7 +149,7 @@ def _video(path: Path) -> None:
 
 def _run(path: Path) -> None:
     run = read_run(path)
-    run.require_fit()
+    run.require_consistency()
     oracles.require_run(run)
     for table in ("tracks", "events", "ghosts", "windows", "rates", "shifts", "timings", "committed", "appearance"):
         getattr(run, table)

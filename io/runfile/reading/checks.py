@@ -177,8 +177,8 @@ def _repeated(rows: Rows) -> bool:
     return bool(same.any())
 
 
-def require_fit(bounds: Bounds, trajectory: Rows, boxes: Rows, tracks: Rows) -> None:
-    """Raise FormatError where tables do not fit each other: rows of no frame or track, a track of other rows."""
+def require_consistency(bounds: Bounds, trajectory: Rows, boxes: Rows, tracks: Rows) -> None:
+    """Raise FormatError where tables contradict each other: rows of no frame or track, a track of other rows."""
     for name, rows in (("trajectory", trajectory), ("boxes", boxes)):
         absent = ~np.isin(rows["frame"], bounds.frames)
         if absent.any():

@@ -25,7 +25,13 @@ from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, PackedFrames
 from stseg.io.runfile.provenance import Provenance, read_provenance
-from stseg.io.runfile.reading.checks import Bounds, LayoutChecks, require_bounded_volume, require_fit, require_table
+from stseg.io.runfile.reading.checks import (
+    Bounds,
+    LayoutChecks,
+    require_bounded_volume,
+    require_consistency,
+    require_table,
+)
 from stseg.io.runfile.reading.hdf5_reading import dataset_texts, format_errors, read_attribute, read_object
 from stseg.io.runfile.reading.run_arrays import RunVolume, to_data_frame
 from stseg.io.untrusted import limits
@@ -197,9 +203,9 @@ class Run:
             raise FormatError(self.path, f"{layout.PROVENANCE}/rig", found, expected)
         return with_alignment(recording, [provenance.frame_at_tick.get(name) for name in self.cameras])
 
-    def require_fit(self) -> None:
-        """Raise FormatError where tables of tracks do not fit each other or the frames."""
-        require_fit(self.bounds, self.trajectory, self.boxes, self.tracks)
+    def require_consistency(self) -> None:
+        """Raise FormatError where tables of tracks contradict each other or the frames."""
+        require_consistency(self.bounds, self.trajectory, self.boxes, self.tracks)
 
     @property
     def detections(self) -> Rows:

@@ -144,7 +144,7 @@ class WorkFolder:
             kept = f"{cause.expected}; the whole result is kept in {self.result}"
             raise OutputError(cause.place, "", cause.found, kept) from error
 
-    def segments(self) -> dict[int, Path]:
+    def whole_segments(self) -> dict[int, Path]:
         """The finished segments by number; files whose bytes have changed are deleted and listed in `broken`."""
         found = finished_segments(self.path) if self._is_own() else FinishedSegments({}, [])
         self.broken += found.broken

@@ -113,7 +113,7 @@ def follow_recording(
                 Followed(read_run(output), "") if done else _follow(job, folder, output, overwrite, reporter, publish)
             )
         except BaseException:
-            if not folder.segments():  # nothing to resume
+            if not folder.whole_segments():  # nothing to resume
                 table.unlink(missing_ok=True)
                 live_corrections_of(output).unlink(missing_ok=True)
             raise
@@ -196,7 +196,7 @@ def last_frame(frames: FrameRange | None) -> int:
 
 def _kept(folder: WorkFolder, live: bool, reporter: Reporter) -> list[FinishedSegment]:
     """Finished segments of an interrupted run. Of files, those after a missing one are removed, to be made anew."""
-    paths, finished = folder.segments(), list[FinishedSegment]()
+    paths, finished = folder.whole_segments(), list[FinishedSegment]()
     for path in folder.broken:
         reporter.note(f"{path}: its bytes have changed since it was written; {'left out' if live else 'made anew'}")
     for index in sorted(paths):

@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.identities.evidence.observations import ObservedRows
 from stseg.identities.search.choice import choose_distinct, empty_present
-from stseg.identities.search.constraints import BoundPeople, binding_people, mark_of
+from stseg.identities.search.constraints import NamedPeople, binding_people, mark_of
 from stseg.identities.search.costs import RowCosts, row_costs
 from stseg.identities.search.extension import (
     Alternatives,
@@ -47,12 +47,12 @@ def extend_beam(
     begin: int,
     frames: Frames,
     every_row: ObservedRows,
-    bound_people: BoundPeople,
+    named_people: NamedPeople,
     constants: Rules,
-    one: Hypotheses,
-    pasts_of_one: Pasts,
-    other: Hypotheses,
-    pasts_of_other: Pasts,
+    current: Hypotheses,
+    pasts_of_current: Pasts,
+    spare: Hypotheses,
+    pasts_of_spare: Pasts,
     number: int,
     size: int,
     counts: Ints,
@@ -61,14 +61,14 @@ def extend_beam(
 ) -> tuple[int, int]:
     """Extend hypotheses by some frames, from number `begin` on; the numbers of the new hypotheses and of their pasts.
 
-    The hypotheses are `number` in `one`, with `size` pasts in `pasts_of_one`; `other` and `pasts_of_other` are room for
-    as many. After an even number of frames the new ones are in the former. For each of k frames, `counts` int64 (k,) is
-    filled with the number of hypotheses after it, `parents` int64 (k, hypothesis) with the one before of each, and
-    `names` int64 (k, hypothesis, row) with the names of its rows.
+    The hypotheses are `number` in `current`, with `size` pasts; `spare` and its pasts are room for as many. After an
+    even number of frames the new ones are in the former. For each of k frames, `counts` int64 (k,) is filled with the
+    number of hypotheses after it, `parents` int64 (k, hypothesis) with the one before of each, and `names` int64 (k,
+    hypothesis, row) with the names of its rows.
     """
-    observed, people, rules = pointed(every_row), pointed(bound_people), pointed(constants)
-    hypotheses, pasts = pointed(one), pointed(pasts_of_one)
-    successors, later_pasts = pointed(other), pointed(pasts_of_other)
+    observed, people, rules = pointed(every_row), pointed(named_people), pointed(constants)
+    hypotheses, pasts = pointed(current), pointed(pasts_of_current)
+    successors, later_pasts = pointed(spare), pointed(pasts_of_spare)
     for step in range(len(counts)):
         k = begin + step
         first, stop = frames.start[k], frames.start[k + 1]
@@ -94,18 +94,18 @@ def extend_beam(
         size = fill_successors(
             hypotheses, pasts, size, parent, slot, slots, first, now, observed, rules, successors, later_pasts
         )
-        _bind(successors, people, k, first, names[step, :number])
+        _note_identities(successors, people, k, first, names[step, :number])
         counts[step] = number
         hypotheses, pasts, successors, later_pasts = successors, later_pasts, hypotheses, pasts
     return number, size
 
 
 @kernel
-def _marks(number: int, hypotheses: Hypotheses, people: BoundPeople, first: int) -> Ints:
+def _marks(number: int, hypotheses: Hypotheses, people: NamedPeople, first: int) -> Ints:
     """Numbers that differ where hypotheses differ in the identities of people that constraints bind from a row on."""
     binding, mark = binding_people(people, first), np.empty(number, np.int64)
     for h in range(number):
-        mark[h] = mark_of(hypotheses.bound, h, binding)
+        mark[h] = mark_of(hypotheses.identity, h, binding)
     return mark
 
 
@@ -118,7 +118,7 @@ def _fill_alternatives(
     frames: Frames,
     row_costs: RowCosts,
     observed: ObservedRows,
-    people: BoundPeople,
+    people: NamedPeople,
     rules: Rules,
     extension: Extension,
     column: Ints,
@@ -133,7 +133,7 @@ def _fill_alternatives(
     for h in range(len(column)):
         end_identities(hypotheses, pasts, h, first, frames.seconds[k], observed, people, rules)
         identities = fill_identities(hypotheses, pasts, h, costs, one)
-        _impose(hypotheses.bound, h, people, k, first, one, identities)
+        _impose(hypotheses.identity, h, people, k, first, one, identities)
         if not fill_cheapest_identities(one, identities):
             fill_least(one, identities, slots)
         cost = 0.0
@@ -146,16 +146,19 @@ def _fill_alternatives(
 
 
 @part
-def _impose(bound: Ints, h: int, people: BoundPeople, k: int, first: int, one: Extension, identities: int) -> None:
-    """Impose on the costs who the rows of the k-th frame are, and are not, by who is bound (hypothesis, person)."""
+def _impose(identity: Ints, h: int, people: NamedPeople, k: int, first: int, one: Extension, identities: int) -> None:
+    """Impose on the costs the identities that rows of the k-th frame must, and must not, have.
+
+    identity (hypothesis, person) is that of each person of the constraints.
+    """
     for j in range(people.start[k], people.start[k + 1]):
         person, row = people.person[j], people.observation[j] - first
-        if people.first[person] < first:
-            impose_identity(one, identities, bound[h, person], row, True)
+        if people.begin[person] < first:
+            impose_identity(one, identities, identity[h, person], row, True)
             continue
-        for other in range(bound.shape[1]):
-            if people.other[person, other] and people.first[other] < first:
-                impose_identity(one, identities, bound[h, other], row, False)
+        for other in range(identity.shape[1]):
+            if people.distinct[person, other] and people.begin[other] < first:
+                impose_identity(one, identities, identity[h, other], row, False)
 
 
 @part
@@ -179,8 +182,8 @@ def _fill_names(
 
 
 @kernel
-def _bind(successors: Hypotheses, people: BoundPeople, k: int, first: int, name: Ints) -> None:
-    """Note who known people are by the names (hypothesis, row) of the rows of the k-th frame."""
+def _note_identities(successors: Hypotheses, people: NamedPeople, k: int, first: int, name: Ints) -> None:
+    """Note the identities of people of the constraints by the names (hypothesis, row) of the k-th frame's rows."""
     for j in range(people.start[k], people.start[k + 1]):
         for n in range(len(name)):
-            successors.bound[n, people.person[j]] = name[n, people.observation[j] - first]
+            successors.identity[n, people.person[j]] = name[n, people.observation[j] - first]

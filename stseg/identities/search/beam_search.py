@@ -17,7 +17,7 @@ from stseg.config import MotionConfig
 from stseg.identities.evidence.observations import Observations
 from stseg.identities.evidence.size_model import SizeModel
 from stseg.identities.search.beam import Frames, extend_beam
-from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints, KnownPeople
+from stseg.identities.search.constraints import NO_CONSTRAINTS, ConstrainedPeople, Constraints
 from stseg.identities.search.hypotheses import Hypotheses, Pasts, Rules
 
 _BIRTH = 6.0
@@ -126,18 +126,18 @@ def search_identities(
     Constraints are pairs of observations. All are obeyed unless they contradict each other.
     """
     frame = np.repeat(np.arange(len(observations.seconds)), np.diff(observations.start))
-    people = KnownPeople.of(constraints, frame)
+    people = ConstrainedPeople.of(constraints, frame)
     # Frames with constraints lose their certain rows: a constraint may overrule them.
     certain = observations.certain & ~np.isin(frame, people.decided(frame))
     observations = replace(observations, certain=certain)
     slots = int(np.diff(observations.start).max(initial=0)) + _SPARE + people.most_open()
     most = limits.hypotheses
     hypotheses, spare = (
-        (Hypotheses.empty(most, slots, len(people.first)), Pasts.empty(2 * most * slots, len(sizes.spread)))
+        (Hypotheses.empty(most, slots, len(people.begin)), Pasts.empty(2 * most * slots, len(sizes.spread)))
         for _ in range(2)
     )
-    rows, bound = observations.rows(), people.bound(observations.start)
-    beam = Frames(observations.start, observations.seconds), rows, bound, _rules(sizes, motion, limits)
+    rows, named = observations.rows(), people.by_frame(observations.start)
+    beam = Frames(observations.start, observations.seconds), rows, named, _rules(sizes, motion, limits)
     history, number, size, begin = _History(np.full(len(observations.order), -1)), 1, 0, 0
     while begin < len(observations.seconds):
         since = history.steps[0].seconds if history.steps else observations.seconds[begin]

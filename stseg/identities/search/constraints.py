@@ -60,22 +60,22 @@ NO_CONSTRAINTS = Constraints.of([], [])
 
 
 @dataclass(frozen=True)
-class KnownPeople:
-    """Observations that constraints name: those that are one person, and pairs of people that are two."""
+class ConstrainedPeople:
+    """People of the observations that constraints name, and which of them are two."""
 
     observation: Ints
     """int64 (k,): observations, rising."""
     person: Ints
     """int64 (k,): person of each observation."""
-    other: Flags
+    distinct: Flags
     """bool (person, person): pairs that are two people; people of one frame are, too."""
-    first: Ints
-    """int64 (person,): first of the observations."""
-    last: Ints
-    """int64 (person,): last of the observations."""
+    begin: Ints
+    """int64 (person,): first observation of each."""
+    end: Ints
+    """int64 (person,): last observation of each."""
 
     @classmethod
-    def of(cls, constraints: Constraints, frame: Ints) -> KnownPeople:
+    def of(cls, constraints: Constraints, frame: Ints) -> ConstrainedPeople:
         """People of the observations that constraints name; frame (n,) is that of every observation."""
         pairs = np.stack([constraints.earlier, constraints.later])
         observation, ends = np.unique(pairs, return_inverse=True)
@@ -84,81 +84,81 @@ class KnownPeople:
         graph = coo_array((np.ones(same.shape[1]), (same[0], same[1])), (number, number))
         people, person = connected_components(graph, directed=False) if number else (0, np.zeros(0, np.int64))
         person = person.astype(np.int64)
-        other = np.zeros((people, people), bool)
-        different = person[ends[:, ~constraints.same]]
+        distinct = np.zeros((people, people), bool)
+        of_two = person[ends[:, ~constraints.same]]
         together = np.array(np.nonzero(frame[observation][:, None] == frame[observation]))
         simultaneous = person[together[:, together[0] != together[1]]]
-        for one, two in (different, simultaneous):
-            other[one, two] = other[two, one] = True
-        first, last = np.full(people, len(frame)), np.full(people, -1)
-        np.minimum.at(first, person, observation)
-        np.maximum.at(last, person, observation)
-        return cls(observation, person, other, first, last)
+        for one, two in (of_two, simultaneous):
+            distinct[one, two] = distinct[two, one] = True
+        begin, end = np.full(people, len(frame)), np.full(people, -1)
+        np.minimum.at(begin, person, observation)
+        np.maximum.at(end, person, observation)
+        return cls(observation, person, distinct, begin, end)
 
     def decided(self, frame: Ints) -> Ints:
         """Frames in which an observation must, or must not, have an identity; frame (n,) is of all observations."""
-        here, begin = frame[self.observation], frame[self.first]
-        others = (self.other[self.person] & (begin < here[:, None])).any(axis=1)
+        here, begin = frame[self.observation], frame[self.begin]
+        others = (self.distinct[self.person] & (begin < here[:, None])).any(axis=1)
         return np.asarray(here[(begin[self.person] < here) | others])
 
     def most_open(self) -> int:
         """Most people at once with observations still to come."""
-        ends = np.concatenate([self.first, self.last])
-        change = np.repeat([1, -1], len(self.first))
+        ends = np.concatenate([self.begin, self.end])
+        change = np.repeat([1, -1], len(self.begin))
         return int(np.cumsum(change[np.lexsort((change, ends))]).max(initial=0))
 
-    def bound(self, start: Ints) -> BoundPeople:
-        """The same for kernels; start (frame + 1,) is the first observation of each frame."""
-        others = np.where(self.other, self.first, -1).max(axis=1, initial=-1)
-        return BoundPeople(
+    def by_frame(self, start: Ints) -> NamedPeople:
+        """The same for kernels, by frame; start (frame + 1,) is the first observation of each frame."""
+        others = np.where(self.distinct, self.begin, -1).max(axis=1, initial=-1)
+        return NamedPeople(
             self.observation,
             self.person,
             np.searchsorted(self.observation, start),
-            self.other,
-            self.first,
-            self.last,
-            np.maximum(self.last, others),
+            self.distinct,
+            self.begin,
+            self.end,
+            np.maximum(self.end, others),
         )
 
 
-class BoundPeople(NamedTuple):
-    """People of constraints; `observation`, `person`, `other`, `first` and `last` are as of `KnownPeople`."""
+class NamedPeople(NamedTuple):
+    """People of constraints; `observation`, `person`, `distinct`, `begin` and `end` are as of `ConstrainedPeople`."""
 
     observation: Ints
     person: Ints
     start: Ints
     """int64 (frame + 1,): the first of the named observations from each frame on."""
-    other: Flags
-    first: Ints
-    last: Ints
+    distinct: Flags
+    begin: Ints
+    end: Ints
     binding: Ints
     """int64 (person,): the last observation that depends on the identity of each."""
 
 
 @part
-def is_awaited(people: BoundPeople, bound: Ints, h: int, name: int, first: int) -> bool:
-    """Whether an identity must be observed again, from an observation on; bound (hypothesis, person) is who all are."""
-    for person in range(bound.shape[1]):
-        if bound[h, person] == name and people.first[person] < first <= people.last[person]:
+def is_awaited(people: NamedPeople, identity: Ints, h: int, name: int, first: int) -> bool:
+    """Whether an identity must be observed again, from an observation on; identity (hypothesis, person) is of all."""
+    for person in range(identity.shape[1]):
+        if identity[h, person] == name and people.begin[person] < first <= people.end[person]:
             return True
     return False
 
 
 @kernel
-def binding_people(people: BoundPeople, first: int) -> Ints:
+def binding_people(people: NamedPeople, first: int) -> Ints:
     """People observed before an observation with an identity that later ones depend on."""
-    found, number = np.empty(len(people.first), np.int64), 0
+    found, number = np.empty(len(people.begin), np.int64), 0
     for person in range(len(found)):
-        if people.first[person] < first <= people.binding[person]:
+        if people.begin[person] < first <= people.binding[person]:
             found[number] = person
             number += 1
     return found[:number]
 
 
 @part
-def mark_of(bound: Ints, h: int, binding: Ints) -> int:
-    """A hash of the identities of some people, bound (hypothesis, person): equal where hypotheses agree on them."""
+def mark_of(identity: Ints, h: int, binding: Ints) -> int:
+    """A hash of the identities of some people, identity (hypothesis, person): equal where hypotheses agree on them."""
     mark = 0
     for person in binding:
-        mark = (mark * 1_000_003 + bound[h, person] + 2) % 2_147_483_647
+        mark = (mark * 1_000_003 + identity[h, person] + 2) % 2_147_483_647
     return mark

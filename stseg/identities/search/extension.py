@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.identities.evidence.observations import ObservedRows
-from stseg.identities.search.constraints import BoundPeople, is_awaited
+from stseg.identities.search.constraints import NamedPeople, is_awaited
 from stseg.identities.search.costs import CONTRADICTION, FORBIDDEN, UNLIKELY, RowCosts
 from stseg.identities.search.hypotheses import FREE, Hypotheses, Pasts, Rules
 from stseg.kernels.accelerate import kernel, part
@@ -62,14 +62,14 @@ def end_identities(
     first: int,
     now: float,
     observed: ObservedRows,
-    people: BoundPeople,
+    people: NamedPeople,
     rules: Rules,
 ) -> None:
     """Free the slots of identities that were unseen for too long; each costs its death. Those awaited stay."""
     for s in range(hypotheses.past.shape[1]):
         p = hypotheses.past[h, s]
         is_over = p >= 0 and now - pasts.seconds[p] > rules.longest
-        if is_over and not is_awaited(people, hypotheses.bound, h, pasts.name[p], first):
+        if is_over and not is_awaited(people, hypotheses.identity, h, pasts.name[p], first):
             hypotheses.score[h] -= rules.birth * observed.inside[pasts.last[p]]
             hypotheses.past[h, s] = FREE
 
@@ -101,11 +101,11 @@ def fill_identities(hypotheses: Hypotheses, pasts: Pasts, h: int, costs: RowCost
 
 
 @part
-def impose_identity(one: Extension, identities: int, bound: int, row: int, same: bool) -> None:
+def impose_identity(one: Extension, identities: int, name: int, row: int, same: bool) -> None:
     """Impose on the costs that a row is, or is not, the identity of this name."""
     cost = one.cost
     for c in range(identities):
-        if one.name[c] == bound:
+        if one.name[c] == name:
             if same:
                 demanded = min(cost[row, c], UNLIKELY)
                 for other in range(identities):

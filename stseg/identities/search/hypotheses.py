@@ -26,7 +26,7 @@ class Hypotheses(NamedTuple):
     """float64 (hypothesis,): nats."""
     past: Ints
     """int64 (hypothesis, slot): which of the pasts each identity has, `FREE` where there is none."""
-    bound: Ints
+    identity: Ints
     """int64 (hypothesis, person): identity of each person of the constraints, -1 before the first observation."""
 
     @classmethod
@@ -101,8 +101,8 @@ def fill_successors(
                     keep_past(pasts, before[s], later_pasts, number)
                     later[before[s], rows], number = number, number + 1
                 after[s] = later[before[s], rows]
-        for person in range(hypotheses.bound.shape[1]):
-            successors.bound[n, person] = hypotheses.bound[parent[n], person]
+        for person in range(hypotheses.identity.shape[1]):
+            successors.identity[n, person] = hypotheses.identity[parent[n], person]
     return number
 
 
