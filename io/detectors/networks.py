@@ -67,7 +67,7 @@ class Network:
             given[names[1]] = np.array([self.size], np.int64)  # of RT-DETR: the size in which boxes are wanted
         try:
             return {name: np.asarray(array, float) for name, array in self._run(given).items()}
-        except (cv2.error, RuntimeError, ValueError) as error:
+        except Exception as error:  # onnxruntime has a type for each of its failures
             raise self._refused(error) from error
 
     def _size(self) -> tuple[int, int]:
@@ -109,7 +109,7 @@ class Network:
         options.log_severity_level = 4
         try:
             session = library.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-        except Exception as error:  # of a type for each of its failures
+        except Exception as error:  # as above
             raise self._refused(error) from error
         names = [one.name for one in self.header.outputs]
         return lambda given: dict(zip(names, session.run(names, given), strict=True))

@@ -69,7 +69,8 @@ def _tensor(data: memoryview) -> Tensor:
     tensor = dict(_fields(_message(kind.get(1, b""))))
     axes = [dict(_fields(_message(axis))) for n, axis in _fields(_message(tensor.get(2, b""))) if n == 1]
     lengths = (axis.get(1) for axis in axes)
-    shape = tuple(length if isinstance(length, int) and length > 0 else None for length in lengths)
+    # Some programs write -1 for a free length: as an unsigned number it is beyond 2^63.
+    shape = tuple(length if isinstance(length, int) and 0 < length < 1 << 63 else None for length in lengths)
     element = tensor.get(1, 0)
     return Tensor(_text(info.get(1, b"")), shape, element if isinstance(element, int) else 0)
 

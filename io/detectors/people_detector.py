@@ -107,7 +107,7 @@ def _class_numbers(path: Path, classes: Sequence[str], names: Mapping[int, str])
     found = []
     for name in classes:
         number = int(name) if name.isdecimal() else by_name.get(name.lower())
-        if number is None:
+        if number is None or (names and number not in names):
             expected = one_of(name, [*by_name]) + (", or its number" if not names else "")
             raise FormatError(path, "classes", repr(name), expected)
         found.append(number)

@@ -81,7 +81,7 @@ def test_one_box_for_each_person_at_the_size_of_training(tmp_path: Path) -> None
     boxes = detector.detect(image).pixel
     inner = boxes[:, 3] < 32  # squares in a square of twice its side overlap by a quarter at most
     assert (~inner).sum() == 1 and inner.sum() == 4 + 16
-    detector = OnnxDetector(_with_input(tmp_path / "model.onnx", "batch", 3, "height", "width"), least_score=0.9)
+    detector = OnnxDetector(_with_input(tmp_path / "model.onnx", -1, 3, "height", -1), least_score=0.9)
     found = detector.detect(picture((WIDTH, HEIGHT), ((64, 32, 96, 64), RED)))
     assert [72, 32, 16, 32] in found.pixel.tolist()
 
@@ -93,8 +93,8 @@ def test_classes_by_name_and_number(tmp_path: Path) -> None:
     for classes, columns in (["person"], {8}), (["dog"], {72}), (["person", "dog"], {8, 72}), (["1"], {72}):
         found = OnnxDetector(model, classes, 0.9).detect(image).pixel
         assert {int(left) for left, _, width, _ in found.tolist() if width == 16} == columns
-    refused(FormatError, r"model\.onnx: classes: found 'dgo', expected one of .*did you mean dog\?",
-            OnnxDetector, model, ["dgo"])  # fmt: skip
+    for wrong, meant in ("dgo", "did you mean dog"), ("2", "expected one of person, dog"):
+        refused(FormatError, rf"model\.onnx: classes: found '{wrong}', .*{meant}", OnnxDetector, model, [wrong])
     for text in "{", "{0: [", "7", "{'a': 'b'}":
         plain = detector_models.yolo8(tmp_path / "plain.onnx", metadata={"names": text})
         refused(FormatError, "expected one of person.*or its number", OnnxDetector, plain, ["dog"])
@@ -114,12 +114,15 @@ def test_refusals_name_the_file_and_the_outputs(tmp_path: Path) -> None:
         refused(ValueError, found, parse_header, data)
     refused(FormatError, "an input of 9999x9999", OnnxDetector, _with_input(tmp_path / "large.onnx", 1, 3, 9999, 9999))
     refused(FormatError, "found the inputs", OnnxDetector, _with_input(tmp_path / "grey.onnx", 1, 1, HEIGHT, WIDTH))
+    other = _with_input(tmp_path / "other.onnx", 1, 3, "height", "width", trained="[640, 640]")
+    for by_opencv in (None, True):  # None: onnxruntime, where it is installed
+        refused(FormatError, "does not run", OnnxDetector, other, by_opencv=by_opencv)
     assert list(MODELS) == [layout.name for layout in LAYOUTS]
 
 
-def _with_input(path: Path, *shape: int | str) -> Path:
-    """A model as other programs may write it, with an input of another shape, names for free lengths."""
-    model = onnx.load_model(detector_models.yolo8(path, metadata={"imgsz": "[64, 96]"}))
+def _with_input(path: Path, *shape: int | str, trained: str = "[64, 96]") -> Path:
+    """A model as other programs may write it, with an input of another shape, names or -1 for free lengths."""
+    model = onnx.load_model(detector_models.yolo8(path, metadata={"imgsz": trained}))
     model.graph.input[0].CopyFrom(onnx.helper.make_tensor_value_info("images", onnx.TensorProto.FLOAT, shape))
     onnx.save_model(model, path)
     return path
