@@ -275,10 +275,9 @@ def test_clicked_points_give_the_cameras(page: Page, tmp_path: Path) -> None:
 @needs_browser
 def test_everything_fits_one_screen_and_undo_keys_and_places(page: Page) -> None:
     page.picture(1280, 720)
-    low = page.ask(
-        "Math.max(...[...document.querySelectorAll('figcaption')].map((f) => f.getBoundingClientRect().bottom))"
-    )
-    assert low < 720
+    edges = "[...document.querySelectorAll('{}')].map((one) => one.getBoundingClientRect())"
+    low = page.ask(f"Math.max(...{edges.format('figcaption')}.map((one) => one.bottom))")
+    assert low < 720 and page.ask(f"{edges.format('.tools')}[0].height") < 45, "one line of tools"
     page.ask("""(() => { const c = document.getElementById('view-cam1'), b = c.getBoundingClientRect();
       c.dispatchEvent(new MouseEvent('mousemove', { clientX: b.left + 9, clientY: b.top + 9 })); return 0; })()""")
     assert page.ask("document.getElementById('lens').getBoundingClientRect().width") == 160

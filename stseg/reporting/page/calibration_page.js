@@ -4,7 +4,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const element = (id) => document.getElementById(id);
   const [x0, y0, x1, y1] = data.area;
-  const LINE = "#2f9fe0", POINT = "#d8322b", QUIET = "#7c828a", HINT = "#e8a200";
+  const LINE = "#2f9fe0", POINT = "#d8322b", QUIET = "#7c828a", DARK = "#3d434c", HINT = "#e8a200";
   let points = [], active = -1, last = null, history = [];
 
   // ---- small linear algebra ----
@@ -236,15 +236,17 @@
 
   // ---- drawing ----
 
-  const cross = (context, [u, v], colour, words) => {
-    context.strokeStyle = colour;
-    context.lineWidth = 2;
-    context.beginPath();
-    context.moveTo(u - 7, v); context.lineTo(u + 7, v); context.moveTo(u, v - 7); context.lineTo(u, v + 7);
-    context.stroke();
-    context.fillStyle = colour;
+  // A cross with words at its right, `below` pixels lower; with a pale border, for it lies on pictures of any colour.
+  const cross = (context, [u, v], colour, words, below) => {
     context.font = "bold 13px system-ui";
-    context.fillText(words, u + 6, v - 6);
+    for (const [paint, width] of [["#ffffffd0", 5], [colour, 2]]) {
+      context.strokeStyle = context.fillStyle = paint;
+      context.lineWidth = width;
+      context.beginPath();
+      context.moveTo(u - 7, v); context.lineTo(u + 7, v); context.moveTo(u, v - 7); context.lineTo(u, v + 7);
+      context.stroke();
+      if (width > 2) context.strokeText(words, u + 7, v - 6 + below); else context.fillText(words, u + 7, v - 6 + below);
+    }
   };
   const ring = (context, [u, v]) => {
     context.strokeStyle = HINT;
@@ -326,7 +328,8 @@
       }
       points.forEach((point, k) => {
         const own = placeOf(sheet, point);
-        if (own) cross(context, toCanvas(sheet, own), k === active ? POINT : QUIET, `${k + 1}${point.z ? ` z ${point.z}` : ""}`);
+        const below = point.z && !sheet.camera ? 20 : 0; // on the plan its foot has the same place
+        if (own) cross(context, toCanvas(sheet, own), k === active ? POINT : DARK, `${k + 1}${point.z ? ` z ${point.z}` : ""}`, below);
       });
       sheet.words = words;
       label(sheet);

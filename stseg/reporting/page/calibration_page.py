@@ -88,7 +88,8 @@ main { max-width: none; padding: 0 12px } h1 { font-size: 18px; margin: 6px 0 } 
 #sheets figcaption { margin: 0; white-space: nowrap; overflow: hidden; text-overflow: ellipsis }
 #lens { position: fixed; width: 160px; height: 160px; border: 2px solid #fff; border-radius: 50%; pointer-events: none }
 #csv { width: 100%; height: 140px; font-family: monospace }
-.tools { margin: 4px 0 } .tools > * { margin-right: 8px } .tools input[type=number] { width: 5.5em }
+.tools { margin: 4px 0 } .tools > * { margin-right: 8px } .tools input[type=number] { width: 5em }
+.tools input[type=range] { width: 80px } .tools a { white-space: nowrap }
 """
 
 _BODY = """<main>
@@ -107,9 +108,9 @@ id="pole" type="number" value="2" step="any" aria-label="pole"> <button id="undo
 <label>frame <input id="moment" type="range" min="0" max="{moments}" value="0"></label>
 <a id="save" download="points.csv">Save points.csv</a></p>
 <div id="sheets"></div>
+<p>Then: <code>{command}</code></p>
 <table><thead><tr><th>point</th><th>camera</th><th>off px</th><th>off cm</th></tr></thead>
 <tbody id="residuals"></tbody></table>
 <textarea id="csv" readonly aria-label="points.csv"></textarea>
-<p>Then: <code>{command}</code></p>
 </main>
 <canvas id="lens" width="160" height="160" hidden></canvas>"""
