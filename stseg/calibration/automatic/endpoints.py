@@ -24,6 +24,11 @@ _HEAD_SHARE, _FEET_SHARE = 0.06, 0.12
 _EROSION = 1.0
 """Distance from the centre of a silhouette's last pixel to the end of the body, pixels: half a pixel, and as much again
 lost to pooling over neighbours and to the high likelihood threshold."""
+_HEAD_BAND, _HEAD_WIDTH, _HEAD_SPREAD = np.array([0.03, 0.10]), 0.11, 0.011
+"""Part of the length in which a head is measured; the mean width of heads there and its standard deviation, in lengths:
+0.155 m by 0.197 m and a centimetre of hair, seen from all sides."""
+_EXCESS_SPREAD, _MOST_EXCESS = 1.5, 5.0
+"""Standard deviation of how far masks reach beyond bodies, and the most that is believed, pixels."""
 _SPECK = 9
 """Pixels of a component below which it is noise."""
 _BRIDGE = (7, 3)
@@ -128,5 +133,14 @@ def _endpoints(label: AnyArray, stats: AnyArray, k: int) -> Floats | None:
     length = lowest - high
     feet, head = across[along > lowest - _FEET_SHARE * length], across[along < high + _HEAD_SHARE * length]
     offset_across = np.array([(feet.max() + feet.min()) / 2, (head.max() + head.min()) / 2])
-    extent = np.array([lowest + _EROSION, high - _EROSION])
+    inward = _EROSION - _excess(along - high, length)
+    extent = np.array([lowest + inward, high - inward])
     return np.asarray(centre + extent[:, None] * down + offset_across[:, None] * np.array([-down[1], down[0]]))
+
+
+def _excess(below: Floats, length: float) -> float:
+    """Pixels by which a silhouette reaches beyond its body on all sides, by its head's width; negative if eroded."""
+    begin, end = length * _HEAD_BAND
+    width = np.count_nonzero((below >= begin) & (below < end)) / (end - begin)
+    share = 1 / (1 + (_HEAD_SPREAD / 2 * length / _EXCESS_SPREAD) ** 2)
+    return float(share * np.clip((width - _HEAD_WIDTH * length) / 2, -_MOST_EXCESS, _MOST_EXCESS))
