@@ -15,11 +15,14 @@ from stseg.io.detections.record import (
     Request,
     listed_frames,
     number,
+    optional_value,
     require_size,
+    required_tables,
     required_value,
 )
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_xml
+from stseg.io.untrusted.values import abbreviated
 
 
 def read_cvat(request: Request) -> Detections:
@@ -62,6 +65,8 @@ def _add_shape(path: Path, found: DetectionList, place: str, frame: int, shape: 
 
 def _refuse_area(path: Path, place: str, kind: object) -> None:
     """FormatError for a shape that covers people but is not read; lines and points cover none."""
+    if not isinstance(kind, str):
+        raise FormatError(path, place, f"a shape {abbreviated(kind)}", "the name of its kind")
     if kind in _OTHER_AREAS:
         raise FormatError(path, place, f"a shape {kind}", "rectangles and polygons")
 
@@ -94,7 +99,8 @@ def read_label_studio(request: Request, data: Any) -> Detections:
             _add_video_track(request, found, place, value)
             lengths.append(int(number(request.path, place, "framesCount", value.get("framesCount", 0))))
         return found.done(max(lengths) or None)
-    names = [str(next(iter(task.get("data", {}).values()), k)) for k, task in enumerate(data)]
+    named = [optional_value(request.path, f"task {k}", task, "data", dict) for k, task in enumerate(data)]
+    names = [str(next(iter(values.values()), k)) for k, values in enumerate(named)]
     frames, count = listed_frames(request.path, names)
     for k, (rows, frame) in enumerate(zip(results, frames.tolist(), strict=True)):
         for index, one in enumerate(rows):
@@ -103,28 +109,33 @@ def read_label_studio(request: Request, data: Any) -> Detections:
 
 
 def _label_studio_results(path: Path, index: int, task: Any) -> Iterator[Any]:
-    given = required_value(path, f"task {index}", task, "annotations")
+    given = required_tables(path, f"task {index}", task, "annotations")
     kept = [annotation for annotation in given if not annotation.get("was_cancelled")]
     if len(kept) > 1:
         raise FormatError(path, f"task {index}", f"{len(kept)} annotations", "one, by one person")
     for annotation in kept:
-        yield from required_value(path, f"task {index}", annotation, "result")
+        yield from required_tables(path, f"task {index}", annotation, "result")
 
 
 def _add_result(request: Request, found: DetectionList, place: str, frame: int, one: Any) -> None:
-    value, (width, height) = one.get("value", {}), request.size
+    value, (width, height) = optional_value(request.path, place, one, "value", dict), request.size
     if one.get("type") == "rectanglelabels":
         x, y, wide, tall = (
             number(request.path, place, key, required_value(request.path, place, value, key)) / 100 for key in _PERCENT
         )
-        label = str(next(iter(value.get("rectanglelabels", [])), ""))
+        label = _first(request.path, place, value, "rectanglelabels")
         found.add(place, frame, (x * width, y * height, wide * width, tall * height), label=label)
     elif one.get("type") == "polygonlabels":
         points = required_value(request.path, place, value, "points")
         mask = _polygon(request.path, place, points, (width / 100, height / 100))
-        found.add(place, frame, mask.box(), label=str(next(iter(value.get("polygonlabels", [])), "")), mask=mask)
+        found.add(place, frame, mask.box(), label=_first(request.path, place, value, "polygonlabels"), mask=mask)
     else:
         _refuse_area(request.path, place, one.get("type"))
+
+
+def _first(path: Path, place: str, value: Any, key: str) -> str:
+    """The first label of a list that may be missing."""
+    return str(next(iter(optional_value(path, place, value, key, list)), ""))
 
 
 _PERCENT = ("x", "y", "width", "height")
@@ -133,8 +144,8 @@ _OTHER_AREAS = ("mask", "ellipse", "cuboid", "skeleton", "circle", "brushlabels"
 
 def _add_video_track(request: Request, found: DetectionList, place: str, value: Any) -> None:
     """One video rectangle: frames count from 1 there; between two keyframes it is enabled in, it moves straight."""
-    steps = required_value(request.path, place, value, "sequence")
-    label, size = str(next(iter(value.get("labels", [])), "")), np.array(request.size * 2)
+    steps = required_tables(request.path, place, value, "sequence")
+    label, size = _first(request.path, place, value, "labels"), np.array(request.size * 2)
     keys = ("frame", *_PERCENT)
     table = np.array(
         [
@@ -171,15 +182,17 @@ def read_via(request: Request, data: Any) -> Detections:
     found = DetectionList(request.path)
     for image, frame in zip(images, frames.tolist(), strict=True):
         regions = image["regions"]
-        for index, region in enumerate(regions.values() if isinstance(regions, dict) else regions):
+        listed = {"regions": list(regions.values()) if isinstance(regions, dict) else regions}
+        for index, region in enumerate(required_tables(request.path, str(image["filename"]), listed, "regions")):
             place = f"{image['filename']}, region {index}"
-            shape = required_value(request.path, place, region, "shape_attributes")
-            label = str(next((v for v in region.get("region_attributes", {}).values() if isinstance(v, str)), ""))
+            shape = optional_value(request.path, place, region, "shape_attributes", dict)
+            given = optional_value(request.path, place, region, "region_attributes", dict)
+            label = str(next((value for value in given.values() if isinstance(value, str)), ""))
             if shape.get("name") == "rect":
                 box = [required_value(request.path, place, shape, key) for key in _PERCENT]
                 found.add(place, frame, box, label=label)
             elif shape.get("name") == "polygon":
-                axes = [required_value(request.path, place, shape, f"all_points_{a}") for a in "xy"]
+                axes = [optional_value(request.path, place, shape, f"all_points_{a}", list) for a in "xy"]
                 mask = _polygon(request.path, place, [*zip_longest(*axes)])
                 found.add(place, frame, mask.box(), label=label, mask=mask)
             else:

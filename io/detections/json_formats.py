@@ -18,8 +18,10 @@ from stseg.io.detections.record import (
     Request,
     last_numbers,
     listed_frames,
+    optional_value,
     read_json,
     require_size,
+    required_tables,
     required_value,
 )
 from stseg.io.untrusted.values import abbreviated
@@ -56,8 +58,9 @@ def read_coco_results(request: Request, data: Any) -> Detections:
 
 def read_dataset(request: Request, data: Any) -> Detections:
     """Detections of a COCO data set: its annotations that are no crowds."""
-    single = [one for one in data["annotations"] if not (isinstance(one, dict) and one.get("iscrowd"))]
-    return _collect(request, single, data["images"], _categories(request.path, data))
+    rows, images = (required_tables(request.path, "data set", data, key) for key in ("annotations", "images"))
+    single = [one for one in rows if not one.get("iscrowd")]
+    return _collect(request, single, images, _categories(request.path, data))
 
 
 def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Mapping[Any, str]) -> Detections:
@@ -116,7 +119,7 @@ def _id(path: Path, place: str, values: Any, key: str) -> Any:
 def _categories(path: Path, data: Mapping[str, Any]) -> dict[Any, str]:
     return {
         _id(path, f"category {k}", one, "id"): str(one.get("name", one["id"]))
-        for k, one in enumerate(data.get("categories", []))
+        for k, one in enumerate(optional_value(path, "data set", data, "categories", list))
     }
 
 
@@ -152,8 +155,9 @@ def read_mmdetection(request: Request, data: Any) -> Detections:
 
 
 def _add(request: Request, found: DetectionList, place: str, frame: int, row: Any) -> None:
-    boxes, scores, labels = (required_value(request.path, place, row, key) for key in ("bboxes", "scores", "labels"))
-    masks = row.get("masks") or [None] * len(boxes)
+    keys = ("bboxes", "scores", "labels")
+    boxes, scores, labels = (optional_value(request.path, place, row, key, list) for key in keys)
+    masks = optional_value(request.path, place, row, "masks", list) if row.get("masks") else [None] * len(boxes)
     if not len(boxes) == len(scores) == len(labels) == len(masks):
         raise FormatError(request.path, place, "bboxes, scores, labels and masks of different lengths", "one each")
     for corners, score, label, mask in zip(boxes, scores, labels, masks, strict=True):
@@ -178,7 +182,7 @@ def read_wildtrack(request: Request, paths: list[Path], data: list[Any]) -> Dete
     for path, frame, people in zip(paths, frames.tolist(), data, strict=True):
         for index, person in enumerate(people):
             place = f"{path.name}, person {index}"
-            for view in required_value(request.path, place, person, "views"):
+            for view in required_tables(request.path, place, person, "views"):
                 if required_value(request.path, place, view, "viewNum") != request.source.view:
                     continue
                 has_view = True

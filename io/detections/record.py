@@ -190,9 +190,26 @@ def required_value(path: Path, place: str, values: Any, key: str) -> Any:
     return values[key]
 
 
+def optional_value(path: Path, place: str, values: Any, key: str, kind: type[dict[str, Any] | list[Any]]) -> Any:
+    """The list, or the values by name, of a key; empty where it is missing, FormatError for another type."""
+    found = values.get(key, kind())
+    if not isinstance(found, kind):
+        raise FormatError(path, place, f"{key} {abbreviated(found)}", "a list" if kind is list else "values by name")
+    return found
+
+
+def required_tables(path: Path, place: str, values: Any, key: str) -> list[dict[str, Any]]:
+    """The list of a key, each with values by name; FormatError where it is missing or another."""
+    found = required_value(path, place, values, key)
+    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+        raise FormatError(path, place, f"{key} {abbreviated(found)}", "a list, each with values by name")
+    return found
+
+
 def require_size(request: Request, place: str, width: object, height: object) -> None:
     """FormatError where a file says another size of images than the camera's; without numbers above 0 it says none."""
-    given = (parse_number(str(width)), parse_number(str(height)))
+    sides = (("width", width), ("height", height))
+    given = tuple(0.0 if side is None else number(request.path, place, name, side) for name, side in sides)
     if min(given) > 0 and given != request.size:
         found, expected = (f"images of {size[0]:g}x{size[1]:g}" for size in (given, request.size))
         raise FormatError(request.path, place, found, f"{expected}, as the camera has")

@@ -26,6 +26,7 @@ COEFFICIENTS: Mapping[LensModel, tuple[str, ...]] = {
 """Names of the numbers of `Lens.distortion`, by model."""
 _UNDISTORT_ROUNDS = 50
 _LEAST_FOCAL = 1e-6  # pixels: smaller ones leave no digits of a projection
+_NO_COEFFICIENT = 1e-100  # its root lies beyond every image
 
 
 @dataclass(frozen=True)
@@ -196,13 +197,13 @@ def _fold(distortion: Floats) -> float:
     k1, k2, _, _, k3, k4, k5, k6 = _filled(distortion, 8)
     over, under = Polynomial([1.0, k1, k2, k3]), Polynomial([1.0, k4, k5, k6])
     rise = over * under + Polynomial([0.0, 2.0]) * (over.deriv() * under - over * under.deriv())
-    squares = np.concatenate([rise.trim().roots(), under.trim().roots()]).astype(complex)
+    squares = np.concatenate([_roots(rise), _roots(under)])
     return float(np.sqrt(_least_positive(squares)))
 
 
 def _fisheye_fold(distortion: Floats) -> float:
     """Tangent of the least angle at which the image's radius stops rising; infinite where that is 90 degrees."""
-    angle = _least_positive(_fisheye_angle(distortion).deriv().trim().roots().astype(complex))
+    angle = _least_positive(_roots(_fisheye_angle(distortion).deriv()))
     return float(np.tan(angle)) if angle < np.pi / 2 else float("inf")
 
 
@@ -210,6 +211,11 @@ def _fisheye_angle(distortion: Floats) -> Polynomial:
     """The angle off the axis at which a fisheye shows a ray, from the ray's own."""
     k1, k2, k3, k4 = distortion
     return Polynomial([0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4])
+
+
+def _roots(polynomial: Polynomial) -> Complexes:
+    """Roots, but for those so far away that their leading coefficient would overflow when it is divided by."""
+    return np.asarray(polynomial.trim(_NO_COEFFICIENT).roots(), complex)
 
 
 def _least_positive(roots: Complexes) -> float:

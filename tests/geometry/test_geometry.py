@@ -178,7 +178,7 @@ class TestLens:
             assert Lens(MATRIX, np.array([*BARREL, *more])).fold == pytest.approx(turn, abs=2e-5)
         assert Lens(MATRIX, np.array([0.1, 0.2])).fold == WIDE.fold == np.inf
         assert Lens(MATRIX, np.array([-1 / 3]), "fisheye").fold == pytest.approx(np.tan(1.0))
-        assert Lens(MATRIX, np.zeros(0)).fold == np.inf
+        assert Lens(MATRIX, np.zeros(0)).fold == Lens(MATRIX, np.array([0.1, 1e-320])).fold == np.inf
 
     def test_points_that_fold_back_and_unreached_corners(self) -> None:
         camera = straight_down(lens=LENS)
