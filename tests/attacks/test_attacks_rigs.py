@@ -4,6 +4,7 @@ import os
 import struct
 import sys
 import zipfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Event, Thread
@@ -70,6 +71,8 @@ def test_matlab_matrices_are_read_by_columns_and_bounded() -> None:
     np.testing.assert_array_equal(parse_mat(mat_file())["P"], np.arange(12.0).reshape(4, 3).T)
     refused(ValueError, r"where .* are left", parse_mat, mat_file(size=2**31))
     assert parse_mat(mat_file(rows=2**20, columns=2**20)) == {}
+    packed = zlib.compress(bytes((64 << 20) + 1))
+    refused(ValueError, "more than", parse_mat, mat_file()[:128] + struct.pack("<II", 15, len(packed)) + packed)
 
 
 @cases()
@@ -148,9 +151,10 @@ def test_long_chunks_and_huge_pictures_are_not_decoded(tmp_path: Path, monkeypat
     packet = bytearray(cv2.imencode(".jpg", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
     start = packet.index(b"\xff\xc0") + 5
     assert PictureHeads().fits(np.frombuffer(packet, np.uint8))
-    packet[start : start + 4] = (16000).to_bytes(2, "big") + (65500).to_bytes(2, "big")
     monkeypatch.setattr(cv2, "imdecode", Mock(side_effect=AssertionError("it was decoded")))
-    assert not PictureHeads().fits(np.frombuffer(packet, np.uint8))
+    for height in (16000, 1):
+        packet[start : start + 4] = height.to_bytes(2, "big") + (65500).to_bytes(2, "big")
+        assert not PictureHeads().fits(np.frombuffer(packet, np.uint8))
     data = bytearray(cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
     start = data.index(b"IDAT") - 4
     data[start : start + 4] = b"\x7f\xff\xff\xff"  # OpenCV would take two gigabytes for it

@@ -82,11 +82,12 @@ def test_pictures_and_tables_replace_nothing_foreign(folder: Path, refusal: Comm
     for command in (
         "inspect rig.toml -o .",
         "measure run.h5 -o .",
+        "run rig.toml -o new.h5 --labels .",
         "report run.h5 -o page.html --pictures .",
         "calibrate check rig.toml --frames 0:2 --pictures west.png",
     ):
         refusal(*command.split(), "--overwrite")
-    assert before.items() <= contents(folder).items()
+    assert before.items() <= contents(folder).items() and not Path("new.h5").exists()
 
 
 @pytest.mark.parametrize("to", [*FORMATS, *ARCHIVES])

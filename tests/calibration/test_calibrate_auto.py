@@ -36,7 +36,7 @@ from stseg.errors import ConfigError, SourceError
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
 from stseg.simulation.rendering.room import render_room
-from stseg.tasks.calibration.automatic import frame_rate_notes
+from stseg.tasks.calibration.automatic import _require_ground, frame_rate_notes
 
 IMAGE = (480, 360)
 
@@ -111,16 +111,7 @@ def test_ends_of_one_who_stands_free_and_of_meetings() -> None:
     assert len(match_endpoints(endpoints, np.array([0, 3]), [ground, ground + 1.0], 0.4, 5.0).frame) == 0
 
 
-@pytest.mark.parametrize(
-    "bodies",
-    [
-        [],
-        [(100, 179, 100, 120)],  # cut by the border
-        [(100, 150, 100, 80), (121, 150, 121, 80)],  # too near to each other
-        [(60, 100, 130, 100)],  # lies
-        [(100, 105, 100, 95)],  # no body
-    ],
-)
+@cases()
 def test_who_is_not_whole_free_and_upright_has_no_ends(bodies: list[tuple[float, float, float, float]]) -> None:
     assert upright_endpoints(painted(*bodies)).shape == (0, 2, 2)
 
@@ -193,6 +184,7 @@ def test_known_distances_fix_scale_uncertainties_and_grid(solution: SolvedViews)
         np.testing.assert_allclose(missed, solution.adjustment.residual, atol=2e-3)
     pixel = np.array([[150.0, 250.0], [300.0, 260.0]])
     known = [KnownDistance(1, pixel, 3.0)]
+    refused(ConfigError, "a pixel that shows no ground", _require_ground, solution, [KnownDistance(1, -9 * pixel, 3.0)])
     larger = adjusted_to(solution, known)
     assert measured(larger, known) == pytest.approx(3.0)
     assert scale_spread(larger, known) < 0.03 < scale_spread(solution, []) < 0.1

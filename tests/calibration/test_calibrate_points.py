@@ -1,6 +1,7 @@
 """Calibration from clicked points, and a lens from a rendered video of a checkerboard."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,7 @@ from recordings import track, write_recording
 from scenes import looking, rig_of, walkers
 from strategies import BARREL, Pose, poses
 
-from stseg import Camera, Grid, errors, evaluate, read_recording, read_run
+from stseg import Camera, Grid, Source, calibrate_points, errors, evaluate, read_recording, read_run
 from stseg.arrays import Bytes, Floats
 from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_fit import PointFit, fit_points
@@ -241,6 +242,11 @@ class TestCommand:
         printed = capsys.readouterr().out
         assert "off px" in printed and "off cm" in printed
         assert "square pixels" in printed
+        sources = {"a": Source("video", Path("a.avi"))}
+        make = partial(
+            calibrate_points, "p.csv", "q.toml", size=(640, 480), grid=Grid((-2, 2), (-2, 2)), frame_rate=8.0
+        )
+        refused(ConfigError, "sources: found a, expected one of camera b", make, sources=sources)
 
     def test_a_lens_for_each_camera(self) -> None:
         table(Path("p.csv"))

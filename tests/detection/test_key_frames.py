@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from checks import cases
 from scenes import CONFIG, FEW_HEIGHTS, detector_of, evidence_of, expecting, people, room, standing_at, walkers
 
 from stseg.arrays import Floats, ViewEvidence
@@ -40,9 +41,7 @@ def is_searched(explanation: Explanation) -> bool:
     return bool(np.isfinite(explanation.residual).any())
 
 
-@pytest.mark.parametrize(
-    ("rate", "longest", "frames"), [(15, 0.5, 7), (10, 0.5, 5), (3, 0.5, 1), (15, 0, 1), (2, 3, 6)]
-)
+@cases()
 def test_no_more_time_passes_between_key_frames_than_is_asked(rate: float, longest: float, frames: int) -> None:
     assert key_frame_interval(rate, replace(FEW_HEIGHTS, key_frame_interval=longest)) == frames
 

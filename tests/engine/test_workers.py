@@ -154,9 +154,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker_processes, "free_memory", lambda: 8 * 2**30)
 
 
-@pytest.mark.parametrize(
-    ("ground_side", "views", "processes"), [(6, 4, 11), (20, 7, 5), (40, 8, 1), (400, 8, 1)]
-)  # one of 20 m and 7 views was measured at 0.9 GiB, one of 40 m and 7 views at 3.8 GiB
+@cases()
 def test_a_large_ground_leaves_room_for_fewer(ground_side: int, views: int, processes: int) -> None:
     grid = Grid((0.0, ground_side), (0.0, ground_side))
     rig = replace(rig_of(corner_cameras()[:1] * views), grid=grid)

@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from checks import drawn, refused
+from checks import cases, drawn, refused
 from hypothesis import strategies as st
 from reference_identities import greatest_score, score
 from simulated_people import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapped, visit
@@ -73,14 +73,7 @@ def test_early_names_are_of_one_hypothesis_and_later_ones_count() -> None:
     assert len(np.unique([names[apart], true["id"][seen.order][apart]], axis=1).T) == 2
 
 
-@pytest.mark.parametrize(
-    ("names", "columns", "distinct"),
-    [
-        ([[0, 3], [3, 0]], [0, 1], 1),  # the same people in other slots
-        ([[0, 3], [1, 3]], [0, 0], 2),  # one begins a frame later
-        ([[0, 1], [0, 1]], [0, 1], 2),  # either of two is there
-    ],
-)
+@cases()
 def test_of_hypotheses_with_the_same_people_the_best_is_kept(
     names: list[list[int]], columns: list[int], distinct: int
 ) -> None:
@@ -262,6 +255,10 @@ def test_a_second_correction_keeps_earlier_answers(undisturbed: Path, tmp_path: 
     assert two.trajectory.tobytes() == both.trajectory.tobytes()
     assert sorted(two.answers.tolist()) == sorted(both.answers.tolist())
     refused(InputError, "contradicts others", solved, one, tmp_path / "back.h5", "swap,20,1,2,")
+    with h5py.File(one, "r+") as file:
+        file["answers"].resize((0,))  # what was answered is not known: nothing is solved again
+    left = (before := read_run(one).trajectory)[before["id"] != 3]
+    assert solved(one, tmp_path / "three.h5", "delete,,3,,").trajectory.tobytes() == left.tobytes()
 
 
 def test_missing_rows_and_answers_that_cannot_be_are_refused(undisturbed: Path, tmp_path: Path) -> None:

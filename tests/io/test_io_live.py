@@ -168,7 +168,8 @@ def live(offsets: tuple[int, ...] = (0, 0)) -> Recording:
     rig = filmed_rig()
     cameras = rig.cameras[: len(offsets)]
     sources = (
-        CameraSource(Source("video", Path("live"), address="rtsp://there/live"), None, offset) for offset in offsets
+        CameraSource(Source("video", Path("live"), address="rtsp://me:secret@there/live"), None, offset)
+        for offset in offsets
     )
     return Recording(Path("rig.toml"), Rig("room", 20.0, rig.grid, cameras), tuple(sources))
 
@@ -204,7 +205,7 @@ def test_broken_streams_are_reopened_and_full_queues_drop() -> None:
     assert blind[-1] < 49
     assert not any(frame_set.dropped for frame_set in some)
     assert [line.split(";")[0] for line in reported] == [
-        "camera east: no pictures from rtsp://there/live",
+        "camera east: no pictures from rtsp://me:***@there/live",
         "camera east: the stream is back",
     ]
     pauses = np.diff(breaking.opened[1:])
@@ -238,7 +239,7 @@ def test_a_run_goes_on_by_its_clock_and_ends_at_other_sizes() -> None:
 
 def test_an_address_in_the_rig_file(tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
-    text = format_rig(live(), path).replace("rtsp://there/live", "rtsp://me:secret@there:554/live?channel=1")
+    text = format_rig(live(), path).replace("rtsp://me:secret@there/live", "rtsp://me:secret@there:554/live?channel=1")
     recording = parse_rig(text, path)
     assert recording.sources[0].source.address == "rtsp://me:secret@there:554/live?channel=1"
     assert format_rig(recording, path) == text

@@ -18,6 +18,8 @@ from attacks import film, write_rig
 from checks import cases, frozen, refused, tables
 
 from stseg import InputError, Source, read_config, read_recording, read_run, read_tracks_csv
+from stseg.commands.measure import measure
+from stseg.commands.review import review
 from stseg.errors import ConfigError, FormatError, OutputError, SourceError
 from stseg.io.answers import read_answers, read_names
 from stseg.io.calibrations.formats import ImportOptions, read_cameras
@@ -31,6 +33,7 @@ from stseg.io.outputs.video_writer import write_film
 from stseg.io.outputs.whole_files import clear_frames, publish_part
 from stseg.io.recording.video.ffmpeg import read_video_size
 from stseg.io.runfile.corrected import write_corrected
+from stseg.io.runfile.provenance import sampled_checksum
 from stseg.io.runfile.unfinished.work_files import read_stream_times
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.io.toml import parse_toml
@@ -57,6 +60,7 @@ def read(folder: Path, name: str, text: str, **keys: Any) -> object:
 
 @cases()
 def test_unknown_json_is_named(tmp_path: Path, name: str, texts: list[str]) -> None:
+    assert read(tmp_path, "frames/0.json", "[]"), "a frame without detections"
     for text in texts:
         refused(InputError, "found JSON of no known detections, expected one of Ultral", read, tmp_path, name, text)
 
@@ -148,6 +152,8 @@ def test_objects_are_refused(run_path: Path, name: str, value: Any, part: str, m
 
     said = refused(FormatError, message, read)
     assert said.isprintable() and len(said) < 600 + len(str(run_path))
+    for command in (measure, review) if part == "require_consistency" else ():
+        refused(FormatError, message, command, run_path, output=run_path.with_name("out"))
 
 
 @pytest.mark.parametrize(("name", "value", "message"), [
@@ -229,6 +235,7 @@ def test_names_of_three_kinds(question: Callable[[object], bool], wrong: list[ob
 _BEGIN, _SEVEN = "GCOL\1\0\0\0", "\0" * 7
 HEAPS = f"{_BEGIN}\x40{_SEVEN}\1{_SEVEN}\x10{_SEVEN}{_BEGIN}{_SEVEN}\0{_SEVEN}\0\x10{_SEVEN}"
 """A heap of an object, in which another one begins, and of 16 free bytes."""
+NINE = ", 1" * 9
 CROWD = "frame,id,x,y\n" + "".join(f"0,{k},0,0\n" for k in range(20_000))
 
 
@@ -256,7 +263,10 @@ CROWD = "frame,id,x,y\n" + "".join(f"0,{k},0,0\n" for k in range(20_000))
         (OutputError, lambda at: write_film(at / os.fsdecode(b"\xff.mp4"), [], 5.0, False), "a path that is no UTF-8"),
         (OutputError, lambda at: write_film(at / "a.mp4", [np.zeros((0, 0, 3), np.uint8)], 5.0, False), "cannot be op"),
         (OSError, lambda at: clear_frames(link(at / "link", at)), "link is a link"),
-        (OutputError, lambda at: begin_anew(at / "q.h5", '["\\u001b"]'), r"found \['\\x1b'\], expected the run"),
+        (OutputError, lambda at: begin_anew(at / "q.h5", f'["\\u001b"{NINE}]'), r"found \['\\x1b', .*, \.\.\.\], exp"),
+        (OutputError, lambda at: begin_anew(at / "q.h5", f'{{"a": [1{NINE}]}}'), r"has \[1, .*, \.\.\.\], exp"),
+        (ValueError, lambda at: require_sound_heaps(text(at / "a", HEAPS[:56])), "64 bytes, more than the file has"),
+        (ValueError, lambda _: parse_npy(b"\x93NUMPY\1\0v\0"), "a .npy header that is cut off"),
     ],
 )  # fmt: skip
 def test_calls_are_refused(tmp_path: Path, kind: type[Exception], call: Callable[[Path], object], message: str) -> None:
@@ -292,6 +302,7 @@ def test_large_pictures_headers_and_archives_are_refused(tmp_path: Path, monkeyp
     film(tmp_path / "a.avi", tmp_path / "plain.avi")
     (tmp_path / "a.y4m").write_bytes(b"YUV4MPEG2 W64 H48 F5:1 Ip A1:1 C420jpeg\nFRAME\n" + bytes(64 * 48 * 3 // 2))
     assert read_video_size(tmp_path / "a.avi") == read_video_size(tmp_path / "a.y4m") == (64, 48)
+    assert sampled_checksum(Source("boxes", Path("/dev/null"))) == "nothing"
     monkeypatch.setattr(limits, "PIXELS", 1000)
     refused(SourceError, "found frames of 64x48, expected at most", read_video_size, tmp_path / "a.avi")
     np.savez(tmp_path / "a.npz", a=NOW, b=NOW)

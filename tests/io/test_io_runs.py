@@ -133,6 +133,8 @@ def test_slips_are_refused_and_parts_of_killed_runs_removed(tmp_path: Path) -> N
         append_frames(writer, np.array([4, 6]), log_odds, label)
         refused(ValueError, "after frame 6", append_frames, writer, np.array([6, 7]), log_odds, label)
         refused(ValueError, "labels of 3 frames for 2", writer.append_packed_labels, [packed_frame(label[0])])
+        writer.append_packed_log_odds(np.array([7]), [packed_frame(log_odds[0])])
+        refused(ValueError, "labels of 2 frames for 3", writer.finish, Tracks(trajectory_of()).summary())
         refused(ValueError, "rows", writer.append, "ghosts", np.zeros(1, layout.ghost_type(3)))
     other = tmp_path / "other.h5"
     refused(ValueError, "views", RunWriter, other, small_recording(tmp_path), VIEWS[:2], CONFIG, overwrite=False)
@@ -257,9 +259,7 @@ def test_a_file_that_appears_meanwhile_is_not_destroyed(tmp_path: Path) -> None:
     assert len(read_run(part).frames) == 6
 
 
-@pytest.mark.parametrize(
-    ("name", "found"), [("nowhere/night.h5", "no such folder"), (".", "a folder"), ("left.avi/night.h5", "no such")]
-)
+@cases()
 def test_impossible_places_are_refused_before_any_work(tmp_path: Path, name: str, found: str) -> None:
     small_recording(tmp_path)
     refused(OutputError, found, RunWriter, tmp_path / name, small_recording(tmp_path), VIEWS, CONFIG, overwrite=True)
@@ -308,6 +308,7 @@ def test_bytes_refused_by_a_full_disk_are_read_back(tmp_path: Path, monkeypatch:
 def test_text_outputs_replace_only_when_whole(tmp_path: Path) -> None:
     path = tmp_path / "tracks.csv"
     path.write_text("old")
+    refused(OutputError, "exists", replacing(path, overwrite=False).__enter__)
     with pytest.raises(RuntimeError), replacing(path, overwrite=True) as part:
         part.write_text("new")
         raise RuntimeError

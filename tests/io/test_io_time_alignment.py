@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import drawn, refused
+from checks import cases, drawn, refused
 from films import write_at_rate, write_stamped
 from hypothesis import strategies as st
 from recordings import blank_recording
@@ -58,7 +58,7 @@ WAVERING = np.delete(every(1.0, 61), 30)
 def a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """a.mp4, of which nothing but that it is no AVI is asked."""
     monkeypatch.chdir(tmp_path)
-    Path("a.mp4").touch()
+    Path("a.mp4").write_bytes(b"RIFF\0\0\0\0WAVE")
 
 
 @drawn(100, st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=60))
@@ -82,10 +82,7 @@ def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -
     assert (least[np.flatnonzero(frame_at_tick < 0)] > 0.25 * max(1.0, period)).all()
 
 
-@pytest.mark.parametrize(
-    ("step", "expected"),
-    [(0.5, [0, 2, 4, 6, 8, 10]), (0.6, [0, 2, 3, 5, 7, 8]), (1.5, [0, 1, 1, 2, 3, 3]), (3.0, [0, 0, 1, 1, 1, 2])],
-)
+@cases()
 def test_other_rates(step: float, expected: list[int]) -> None:
     assert nearest_frames(every(step, 40), step)[:6].tolist() == expected
 
@@ -202,12 +199,9 @@ def test_ends_that_nearly_meet_are_made_to(blind: bool) -> None:
     assert lengths == ([None, 56, 66] if blind else [None, 60, 58])
 
 
-@pytest.mark.parametrize(
-    ("starts", "reported"),
-    [((0.0,), "1 starts of 2 files"), ((3.0, 1.0), "starts 3, 1"), ((-1.0, 1.0), "starts -1, 1")],
-)
-def test_starts_are_one_for_each_file(starts: tuple[float, ...], reported: str) -> None:
-    source = CameraSource(Source("video", Path("a"), more=(Path("b"),), starts=starts))
+@cases()
+def test_starts_are_one_for_each_file(starts: list[float], reported: str) -> None:
+    source = CameraSource(Source("video", Path("a"), more=(Path("b"),), starts=tuple(starts)))
     times = [[every(100.0, 3), every(100.0, 3)]]
     refused(SourceError, f"camera cam1, source.starts: found {reported}", align_in_time, recording(source), times)
 

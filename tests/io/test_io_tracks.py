@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import drawn, refused
+from checks import cases, drawn, refused
 from hypothesis import strategies as st
 from run_files import table_of
 
@@ -60,9 +60,7 @@ def test_lines_are_short_and_columns_in_any_order(path: Path) -> None:
     refused(OutputError, "nowhere", write_tracks_csv, path.parent / "nowhere" / "tracks.csv", trajectory([]))
 
 
-@pytest.mark.parametrize(
-    ("ids", "read"), [("5 3", [5, 3]), ("anna bert", [1, 2]), ("7 07", [1, 2]), ("-4 99999999999999999999", [1, 2])]
-)
+@cases()
 def test_ids_are_numbers_or_names(path: Path, ids: str, read: list[int]) -> None:
     one, other = ids.split()
     path.write_text(f"frame,id,x,y\n0,{one},0,0\n0,{other},1,1\n1,{one},0,0\n")

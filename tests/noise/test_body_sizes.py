@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from checks import drawn, numbers
+from checks import cases, drawn, numbers
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, detector_of, evidence_of, expecting, likelihoods, people, room
 from scipy.signal import lfilter
@@ -198,9 +198,7 @@ def mean_variance(errors: LastingError, frames: Ints) -> float:
     return float(errors.white[0] / len(frames) + errors.lasting[0] * alike)
 
 
-@pytest.mark.parametrize(
-    ("white", "lasting", "seconds"), [(0.03, 0.0, 1.0), (0.02, 0.05, 0.4), (0.02, 0.05, 2.0), (0.01, 0.03, 5.0)]
-)
+@cases()
 def test_differences_of_halves_are_as_large_as_claimed(white: float, lasting: float, seconds: float) -> None:
     """Between means of 5 s of one person, 5 s apart: their variance is claimed, and that of two people is not."""
     values, frame = recording(white, lasting, seconds)
