@@ -50,7 +50,7 @@ def _read(file: Path) -> ForeignCamera:
         raise FormatError(file, "", f"{len(matrices)} arrays of that shape{names}", _PROJECTION)
     ((key, matrix),) = matrices.items()
     if matrix.dtype.kind not in "iuf" or not (np.abs(matrix) <= limits.NUMBER).all():
-        raise FormatError(file, key, "values that are no finite numbers of usual size", _PROJECTION)
+        raise FormatError(file, key, "numbers that are not finite, or not of usual size", _PROJECTION)
     return ForeignCamera(file, "", None, matrix.astype(float))
 
 
