@@ -155,7 +155,7 @@ class TestProjection:
         np.savez(tmp_path / "two.npz", a=self.matrix, b=self.matrix)
         refused(FormatError, r"2 arrays of that shape \(a, b\)", read_projection, [tmp_path / "two.npz"])
         np.save(tmp_path / "nan.npy", self.matrix * np.nan)
-        refused(FormatError, r"no finite numbers", read_projection, [tmp_path / "nan.npy"])
+        refused(FormatError, r"numbers that are not finite", read_projection, [tmp_path / "nan.npy"])
         np.save(tmp_path / "objects.npy", self.matrix.astype(object))
         refused(FormatError, r"cannot be read", read_projection, [tmp_path / "objects.npy"])
         refused(FormatError, r"the suffix '.yml', expected one of .txt", read_projection, [tmp_path / "cam.yml"])
