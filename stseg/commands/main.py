@@ -68,6 +68,7 @@ def command() -> NoReturn:
     leave_out_current_folder()
     collect_rarely()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small; its threads wait for work by spinning
+    os.environ["NUMBA_NUM_THREADS"] = "1"  # no kernel is parallel, and numba fails at numbers that are none
     atexit.register(leave)  # the first to be registered is the last to be called
     status = main()
     if status in (INTERRUPTED, TERMINATED):

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from stseg.config.ranges import Settings, at_least, not_negative, positive, require, share, within
+from stseg.config.ranges import COUNT, METRES, Settings, at_least, not_negative, positive, require, share, within
 
 
 @dataclass(frozen=True)
 class DetectionConfig(Settings):
     """Per-frame detection: maximum a posteriori set of people (HW12 section IV; how-it-works, Detection)."""
 
-    lattice_spacing: float = positive(0.20)
+    lattice_spacing: float = positive(0.20, most=METRES)
     """Spacing of the ground lattice that is searched for candidates, metres."""
     search_rounds: int = at_least(4, 1)
     """Rounds of search per frame; each searches for people hidden by those already found."""
@@ -18,9 +18,9 @@ class DetectionConfig(Settings):
     """Prior log-odds of a person at a candidate position, nats; raise it against misses, lower it against ghosts."""
     birth_cost: float = not_negative(5.0, "0 or more nats")
     """Cost of a detection that continues no track, away from the border, nats."""
-    border_width: float = positive(1.0)
+    border_width: float = positive(1.0, most=METRES)
     """Width of the border strip along which the birth cost rises from nothing, metres."""
-    minimum_distance: float = positive(0.30)
+    minimum_distance: float = positive(0.30, most=METRES)
     """Distance of two bodies below which they would overlap, metres."""
     box_log_ratio: float = positive(4.5)
     """Log-likelihood ratio, person against clutter, of a box that fits perfectly, nats."""
@@ -40,7 +40,7 @@ class DetectionConfig(Settings):
     """Probability of foreground on a ray past all bodies, 0..1 (b); the volume's first guess."""
     key_frame_interval: float = not_negative(0.5, "0 or more seconds")
     """Longest time between two frames whose whole ground is searched, seconds; 0 to search it in every frame."""
-    swap_moves: int = not_negative(2)
+    swap_moves: int = not_negative(2, most=COUNT)
     """Rounds of swap moves (one person for two, and the like) in larger groups, where all views deliver pixels."""
 
     def __post_init__(self) -> None:
@@ -67,9 +67,9 @@ class ProposalConfig(Settings):
     """Probability that a view misses a person completely, 0..1."""
     covered_share: float = share(0.50)
     """Share of a pillar that must be foreground for a view to support a person, 0..1."""
-    lattice_spacing: float = positive(0.20)
+    lattice_spacing: float = positive(0.20, most=METRES)
     """Spacing of the ground lattice of the probability, metres."""
-    kernel_radius: float = positive(0.30)
+    kernel_radius: float = positive(0.30, most=METRES)
     """C: radius of the mean-shift kernel, metres; HW12's 0.80 merges two people a metre apart."""
 
 
@@ -79,7 +79,7 @@ class OccupancyConfig(Settings):
 
     occupied_share: float = share(0.02)
     """Prior share of occupied cells where no person was detected, 0..1 (pi)."""
-    person_radius: float = positive(0.40)
+    person_radius: float = positive(0.40, most=METRES)
     """Radius around a person's position within which cells may be theirs, metres."""
     effective_observations: float = within(0.6, lambda value: 0 < value <= 1, "above 0, at most 1")
     """Effective number of independent observations of a cell in one view, 0..1: views err together (k)."""
@@ -113,11 +113,11 @@ class LabelConfig(Settings):
     """k2: range of colour differences over which that cost falls, grey levels."""
     colourless_factor: float = not_negative(0.08)
     """Share of c2 at a boundary in masks, which have no colours, 0..1."""
-    position_noise: float = positive(0.08)
+    position_noise: float = positive(0.08, most=METRES)
     """Error of a position beyond its own covariance, metres (standard deviation)."""
-    samples: int = at_least(64, 1)
+    samples: int = at_least(64, 1, 10_000)
     """Pillars drawn for each person."""
-    height_noise: float = not_negative(0.05)
+    height_noise: float = not_negative(0.05, most=METRES)
     """Error of a person's height, metres (standard deviation)."""
     outlier_rate: float = share(1e-3)
     """Share of pixels with a label that no drawn pillar explains, 0..1."""

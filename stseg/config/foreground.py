@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from stseg.config.ranges import Settings, at_least, not_negative, positive, share, within
+from stseg.config.ranges import COUNT, Settings, at_least, not_negative, positive, share, within
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class BackgroundConfig(Settings):
     """m: share of people's colours that look like shadowed background, 0..1."""
     match_distance: float = positive(5.0)
     """Distance within which a colour belongs to a learned mode, standard deviations."""
-    smoothing_radius: int = not_negative(1, "0 or more pixels")
+    smoothing_radius: int = not_negative(1, "0 or more pixels", most=COUNT)
     """Radius over which log-odds are averaged, pixels; 0 for none."""
 
 
@@ -34,7 +34,7 @@ class BackgroundConfig(Settings):
 class MixtureConfig(BackgroundConfig):
     """Mixture of Gaussians per pixel (Stauffer and Grimson 1999; Zivkovic 2004)."""
 
-    modes: int = at_least(3, 1)
+    modes: int = at_least(3, 1, 100)
     """K: modes per pixel; with 1 no object is ever absorbed."""
     background_weight: float = share(0.1)
     """Weight from which a mode is background: share of time in which it is visible, 0..1."""
@@ -48,7 +48,7 @@ class MixtureConfig(BackgroundConfig):
 class ChromaticConfig(MixtureConfig):
     """Mixture of Gaussians per pixel, in brightness and chromaticity."""
 
-    minimum_sd: float = 3.0
+    minimum_sd: float = positive(3.0)
     """Lower bound of the standard deviation of a mode's brightness, grey levels."""
     chromatic_sd: float = positive(2.0)
     """Lower bound of the standard deviation of a mode's colour across its ray, grey levels."""
@@ -58,7 +58,7 @@ class ChromaticConfig(MixtureConfig):
 class CodebookConfig(BackgroundConfig):
     """Codebook per pixel (Kim et al. 2005)."""
 
-    codewords: int = at_least(3, 1)
+    codewords: int = at_least(3, 1, 100)
     """K: codewords per pixel; with 1 no object is ever absorbed."""
     channel_sd: float = positive(2.5)
     """sigma: standard deviation of a channel around its codeword, grey levels."""

@@ -6,6 +6,15 @@ from typing import Any
 
 from stseg.errors import ConfigError
 
+LARGEST = 1e9
+"""Largest size of a setting, in any unit: seconds of 30 years."""
+METRES = 1e3
+"""Largest length of a setting, metres, and speed, metres per second."""
+COUNT = 1_000
+"""Largest number of what is made or repeated so many times, where a setting states no other."""
+SEED = 2**63 - 1
+"""Largest seed: the largest number of TOML."""
+
 
 class Settings:
     """Base of the sections of the configuration: each field is held to its range.
@@ -18,9 +27,12 @@ class Settings:
 
     def __post_init__(self) -> None:
         for one in fields(self):  # type: ignore[arg-type]  # sections are dataclasses
+            value, most = getattr(self, one.name), one.metadata.get("most", LARGEST)
             if "range" in one.metadata:
                 holds, expected = one.metadata["range"]
-                require(holds(getattr(self, one.name)), self, one.name, expected)
+                require(holds(value), self, one.name, expected)
+            if isinstance(value, float | int):
+                require(abs(value) <= most, self, one.name, f"at most {most:g}" if value > 0 else f"at least {-most:g}")
 
 
 def require(holds: bool, settings: object, name: str, expected: str) -> None:
@@ -29,24 +41,24 @@ def require(holds: bool, settings: object, name: str, expected: str) -> None:
         raise ConfigError("configuration", name, repr(getattr(settings, name)), expected)
 
 
-def within(default: Any, holds: Callable[[Any], bool], expected: str) -> Any:
-    """A field with a default and a range."""
-    return field(default=default, metadata={"range": (holds, expected)})
+def within(default: Any, holds: Callable[[Any], bool], expected: str, most: float = LARGEST) -> Any:
+    """A field with a default and a range; numbers are of at most a size."""
+    return field(default=default, metadata={"range": (holds, expected), "most": most})
 
 
-def positive(default: float, expected: str = "a number above 0") -> Any:
+def positive(default: float, expected: str = "a number above 0", most: float = LARGEST) -> Any:
     """A field for numbers above 0."""
-    return within(default, lambda value: value > 0, expected)
+    return within(default, lambda value: value > 0, expected, most)
 
 
-def not_negative(default: float, expected: str = "0 or more") -> Any:
+def not_negative(default: float, expected: str = "0 or more", most: float = LARGEST) -> Any:
     """A field for numbers from 0 on."""
-    return within(default, lambda value: value >= 0, expected)
+    return within(default, lambda value: value >= 0, expected, most)
 
 
-def at_least(default: int, least: int) -> Any:
+def at_least(default: int, least: int, most: int = COUNT) -> Any:
     """A field for whole numbers from `least` on."""
-    return within(default, lambda value: value >= least, f"{least} or more")
+    return within(default, lambda value: value >= least, f"{least} or more", most)
 
 
 def share(default: float) -> Any:

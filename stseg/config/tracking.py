@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.config.ranges import Settings, at_least, not_negative, positive, require, within
+from stseg.config.ranges import METRES, Settings, at_least, not_negative, positive, require, within
 
 _TALLEST = 2.2
 """Metres; taller pillars reach above most grids."""
@@ -20,9 +20,9 @@ class SegmentationConfig(Settings):
 
     smoothness: float = within(0.4, lambda value: 0 <= value <= 16, "0 to 16 nats")
     """lambda: cost of different labels of two adjacent cells, nats."""
-    distance_scale: float = positive(0.20)
+    distance_scale: float = positive(0.20, most=METRES)
     """s: distance of two cells at which that cost has fallen to 0.6, metres."""
-    time_distance: float = not_negative(0.15, "0 or more metres")
+    time_distance: float = not_negative(0.15, "0 or more metres", most=METRES)
     """Distance assigned to neighbours in time after motion compensation, metres."""
     neighbours: int = within(8, lambda value: value in (8, 80), "8 or 80")
     """Neighbours of a cell: 8 (one step along x, y, plane or time) or 80 (diagonals as well)."""
@@ -39,9 +39,9 @@ class TrackingConfig(Settings):
     `context` later."""
     context: float = not_negative(1.0)
     """Time before and after a window that counts, too, when it is decided who is real, seconds; at most 30 frames."""
-    height_noise: float = positive(0.035)
+    height_noise: float = positive(0.035, most=METRES)
     """Error of one frame's height of a fully visible person, metres (standard deviation)."""
-    width_noise: float = positive(0.03)
+    width_noise: float = positive(0.03, most=METRES)
     """Error of one frame's width of a fully visible person, metres (standard deviation)."""
     prediction_horizon: float = not_negative(0.6)
     """Time for which a track is extrapolated while the cells of a window are assigned, seconds."""
@@ -77,7 +77,7 @@ class SegmentConfig(Settings):
     """Time before its first frame from which a segment observes, seconds, to know who is present."""
     background_period: float = positive(300.0, "seconds, above 0")
     """Without an empty scene, each such part of the recording has its own background, seconds."""
-    background_samples: int = at_least(40, 1)
+    background_samples: int = at_least(40, 1, 10_000)
     """Frames from which such a background is learned."""
 
 
@@ -115,13 +115,13 @@ class BodyConfig(Settings):
     widths fall in proportion.
     """
 
-    height_mean: float = positive(_COMMON_HEIGHT)
+    height_mean: float = positive(_COMMON_HEIGHT, most=_TALLEST)
     """Mean height of the people recorded, metres (HW12); the first guess of what the run learns."""
-    height_spread: float = positive(0.12)
+    height_spread: float = positive(0.12, most=METRES)
     """Standard deviation of their heights, metres; the least that the run learns."""
-    width_mean: float = positive(_COMMON_WIDTH)
+    width_mean: float = positive(_COMMON_WIDTH, most=_TALLEST)
     """Mean width of a body across shoulders and arms, metres; the first guess."""
-    width_spread: float = positive(0.04)
+    width_spread: float = positive(0.04, most=METRES)
     """Standard deviation of these widths, metres; the least that the run learns."""
     prior_weight: float = positive(20.0)
     """Weight of these means and spreads: seconds of one person; sizes that the run measures count beside them."""
@@ -156,9 +156,9 @@ class BodyConfig(Settings):
 class MotionConfig(Settings):
     """Nearly constant velocity: white acceleration (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2)."""
 
-    speed_spread: float = positive(0.8)
+    speed_spread: float = positive(0.8, most=METRES)
     """Standard deviation of walking velocity along each axis, metres per second."""
-    velocity_noise: float = positive(0.8)
+    velocity_noise: float = positive(0.8, most=METRES)
     """Random change of velocity, metres per second per square root of a second (standard deviation)."""
-    position_noise: float = positive(0.15)
+    position_noise: float = positive(0.15, most=METRES)
     """Error of one frame's position beyond its own covariance, metres (standard deviation): calibration and gait."""

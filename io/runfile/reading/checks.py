@@ -184,8 +184,9 @@ def require_consistency(bounds: Bounds, trajectory: Rows, boxes: Rows, tracks: R
         if absent.any():
             found = f"frame {rows['frame'][int(np.argmax(absent))]}, which the run has not"
             raise FormatError(bounds.path, f"/{name}, frame", found, "frames of the run")
-    if (tracks["last"] < tracks["first"]).any() or len(np.unique(tracks["id"])) != len(tracks):
-        raise FormatError(bounds.path, "/tracks", "a track that ends before it begins, or twice", "each once")
+    lasts = tracks["last"] - tracks["first"] + 1
+    if (lasts < np.maximum(tracks["frames"], 1)).any() or len(np.unique(tracks["id"])) != len(tracks):
+        raise FormatError(bounds.path, "/tracks", "a track shorter than its frames, or twice", "each once")
     strange = ~np.isin(trajectory["id"], tracks["id"])
     if strange.any():
         found = f"id {trajectory['id'][int(np.argmax(strange))]}, of which /tracks has no row"
