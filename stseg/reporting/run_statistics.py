@@ -1,6 +1,5 @@
 """Statistics of a run: certainty of its tracks, people by the minute and hour, ground by number of views."""
 
-import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,10 +12,10 @@ DOUBT_LIMIT = 0.9
 """Probability below which a point is doubtful."""
 _LONG_RUN = 600.0
 """Length of a run from which its busiest minutes are shown separately, seconds."""
-_EXCHANGE_RATE, _RATE_OF_ABSENCE, _RATE_OF_DOUBT = 0.011, 0.18, 0.33
-"""Exchanges of a track, by each second in which it has no row, and by each -log of the chance that a doubt is none."""
-_MOST_DOUBT = 0.95
-_STATED_CHANCE = re.compile(rb"probability of (\d{1,3}) %")
+_EXCHANGE_RATE, _RATE_NEAR_ENDS, _RATE_OF_ABSENCE = 0.058, 0.044, 0.15
+"""Exchanges of a track, by each track that begins or ends near it, and by each second in which it has no row."""
+_END_DISTANCE, _BORDER_WIDTH = 1.5, 0.5
+"""Distance from such an end, and of such ends from the border, metres."""
 _MINUTE, _HOUR = 60.0, 3600.0  # seconds
 
 
@@ -49,18 +48,22 @@ def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
     return np.array([means.get(int(track), np.nan) for track in tracks["id"]])
 
 
-def exchange_chances(tracks: Rows, events: Rows, frame_rate: float) -> Floats:
+def exchange_chances(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> Floats:
     """Chance that each of `tracks` shows another person for a second or more, float64 (n,), 0..1.
 
-    It grows with the time without a row, and with the chance that decisions about the track are wrong, as EVENT rows of
-    the kind doubt say it; the rates are of perturbed runs of recordings.
+    It grows with each track that begins or ends near it, away from the border float64 (2, 2) (the lower and the upper
+    corner of the ground, metres), and with the time without a row; the rates are of perturbed runs of recordings.
     """
+    place = {track: k for k, track in enumerate(tracks["id"].tolist())}
+    rows = trajectory[np.lexsort((trajectory["id"], trajectory["frame"]))]
     rate = _EXCHANGE_RATE + _RATE_OF_ABSENCE * (tracks["last"] - tracks["first"] + 1 - tracks["frames"]) / frame_rate
-    for event in events[events["kind"] == b"doubt"]:
-        wrong = _STATED_CHANCE.search(bytes(event["reason"]))
-        if wrong and b"same person" not in event["reason"]:  # which would be a track in parts, and no exchange
-            named = (tracks["id"] == event["id"]) | (tracks["id"] == event["other"])
-            rate[named] -= _RATE_OF_DOUBT * np.log1p(-min(int(wrong[1]) / 100, _MOST_DOUBT))
+    for name in ("first", "last"):
+        for track in tracks[(tracks[name] > rows["frame"][:1]) & (tracks[name] < rows["frame"][-1:])]:
+            people = rows[slice(*np.searchsorted(rows["frame"], [track[name], track[name] + 1]))]
+            ground, end = np.stack([people["x"], people["y"]], -1), people["id"] == track["id"]
+            if end.any() and (np.minimum(ground[end] - border[0], border[1] - ground[end]) > _BORDER_WIDTH).all():
+                neighbours = ~end & (np.hypot(*(ground - ground[end][0]).T) < _END_DISTANCE)
+                rate[[place[track] for track in people["id"][neighbours].tolist() if track in place]] += _RATE_NEAR_ENDS
     return np.asarray(-np.expm1(-rate), float)
 
 

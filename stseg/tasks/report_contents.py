@@ -59,7 +59,7 @@ def page_contents(
         span=span,
         trajectory=trajectory,
         tracks=run.tracks,
-        exchange_chances=exchange_chances(run.tracks, run.events, run.frame_rate),
+        exchange_chances=exchange_chances(trajectory, run.tracks, run.frame_rate, np.array([rig.grid.x, rig.grid.y]).T),
         events=run.events,
         candidates=len(run.ghosts),
         ghosts=ghosts,

@@ -10,10 +10,8 @@ from run_files import table_of, trajectory_of
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
-from stseg.identities.review.doubts import Doubt
-from stseg.identities.review.weighed_doubts import _event
 from stseg.records.point_probability import point_probability
-from stseg.records.tables import EVENT, TRACK, TRAJECTORY, Tracks
+from stseg.records.tables import TRACK, TRAJECTORY, Tracks
 from stseg.reporting import run_statistics
 from stseg.reporting.charts import clock_time, people_chart, track_chart
 from stseg.reporting.pictures.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
@@ -70,19 +68,21 @@ def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
     assert svg.count('class="pale"') == 4 and "track 1, frames 3 to 4: 50 % certain" in svg
 
 
-def test_few_views_doubts_and_absence_make_points_less_certain() -> None:
+def test_few_views_ends_and_absence_make_points_less_certain() -> None:
     rows = trajectory_of(*((frame, 1, 0, 0) for frame in range(8)))
     rows["score"], rows["views"] = 50.0, np.arange(8)
     certain = point_probability(rows)
     assert (np.diff(certain) >= 0).all()
     assert certain[1] < 0.6 < 0.9 < certain[2] < 0.97 < 0.99 < certain[7] < 1
-    rows = trajectory_of(*((frame, track, 0, 0) for track in (1, 2, 3, 4) for frame in range(40)), (90, 4, 0, 0))
+    walks = [(frame, track, x, 0.0) for track, x in ((1, 3.0), (2, 8.0)) for frame in range(40)]
+    late = [(frame, 3, 4.0, 0.0) for frame in range(20, 40)]  # begins inside, a metre from the first
+    at_border = [(frame, 4, 9.8, 0.0) for frame in range(20, 40)]
+    away = [(frame, 5, 5.0, 4.0) for frame in (*range(10), *range(30, 40))]
+    rows = trajectory_of(*walks, *late, *at_border, *away)
     tracks = Tracks(rows).summary()
-    doubts = Doubt("encounter", 1, 4, 5, 6, 0.4), Doubt("gap", 2, 3, 5, 6, 0.2), Doubt("birth", 4, 0, 5, 6, -9.0)
-    events = np.array([_event(doubt) for doubt in doubts], EVENT)
-    chances = run_statistics.exchange_chances(tracks, events, 10.0)
-    assert chances[1] == chances[2] < 0.05 < chances[0] == pytest.approx(1 - (1 - chances[1]) * 0.6**0.33)
-    assert chances[0] < run_statistics.exchange_chances(tracks, events[:2], 10.0)[3] < chances[3] < 1
+    chances = run_statistics.exchange_chances(rows, tracks, 10.0, np.array([[0.0, -5.0], [10.0, 5.0]]))
+    assert chances[1] == chances[2] == chances[3] < chances[0] < chances[4] < 1
+    assert run_statistics.exchange_chances(rows[:0], tracks[:0], 10.0, np.zeros((2, 2))).shape == (0,)
 
 
 def stays(*tracks: tuple[int, int]) -> Rows:

@@ -174,8 +174,8 @@ _IMAGES = (
 )
 _CERTAINTY = note(
     "A person: how certain its points are people, on average. Exchanged: the chance that the track shows another "
-    "person for a second or more, by the doubts about its identity. Expected calibration errors: up to 0.05 of the "
-    "former; of the latter 0.01 to 0.12 on the recordings it was fitted to, up to 0.15 on others."
+    "person for a second or more. Expected calibration errors: up to 0.04 of the former; 0.03 of the latter on the "
+    "recordings it was fitted to, about 0.1 on others."
 )
 _SIGHTS = note(
     "The evidence is the median over the people in the view. Where it is near 0 or below, the others find people that "
