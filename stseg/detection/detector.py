@@ -14,6 +14,7 @@ from stseg.arrays import Flags, ViewEvidence
 from stseg.bodies.box_fit import BoxNoise
 from stseg.bodies.views import BoxView, DetectorView, PixelView, ViewObservation, ViewObservations
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
+from stseg.detection.alternatives import best_alternative, likelihood_gain
 from stseg.detection.evidence.birth_lattice import lattice
 from stseg.detection.evidence.pixel_lattice import PixelLattice
 from stseg.detection.explanation import explained_frame
@@ -23,6 +24,7 @@ from stseg.detection.prior import Prior
 from stseg.detection.problem import ScoreParameters
 from stseg.detection.score.scoring import CORE_MARGIN
 from stseg.detection.search.frame_search import FrameSearch
+from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.restarts import better_of, has_weak_members
 from stseg.geometry import Rig
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
@@ -124,13 +126,15 @@ class Detector:
         views: Sequence[ViewEvidence],
         predicted: PredictedTracks | None,
         proposals: Candidates | None = None,
+        alternative: PredictedTracks | None = None,
     ) -> Explanation:
         """Explain a session's next frame by the views that are not excluded, and update what the session has learned.
 
         `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`).
         `predicted` are the tracks of earlier frames; None in a first frame, where births cost nothing. `proposals` are
         candidates from elsewhere, best first: added to those of the first round's lattice, but for duplicates. A frame
-        in which a view begins to fail is explained again without it.
+        in which a view begins to fail is explained again without it. `alternative` are tracks of another reading of the
+        frames before, by which the frame is explained, too; without them a key frame's search may find one.
         """
         observations, failures = self.observe(views, learned.box_noise.noise), learned.failures
         failures.begin(predicted, self.views, observations)
@@ -142,6 +146,9 @@ class Detector:
         if failures.learn(explanation, self.views, observations):
             included = failures.kept(observations)
             explanation, is_searched = self._explained(learned, is_key, included, predicted, proposals)
+        if alternative is not None:
+            other, _ = self._explained(learned, False, included, alternative, None)
+            explanation = self._with_alternative(explanation, other, learned, included)
         if self._has_boxes:
             learned.box_noise.learn(explanation, self.views, included)
             learned.box_bias.learn(explanation, self.views, included)
@@ -173,8 +180,18 @@ class Detector:
         estimate = self._search.whole(tracks, proposals)
         if is_key and predicted is not None and not self._has_boxes and has_weak_members(estimate):
             untracked = self._evidence(evidence.observations, evidence.prior.body, None)
-            estimate = better_of(estimate, self._search.without_tracks(estimate, untracked))
+            people = self._search.without_tracks(untracked)
+            estimate = better_of(estimate, self._search.repeated(estimate, people))
+            return _with_best_alternative(estimate, untracked, people), True
         return explained_frame(estimate), True
+
+    def _with_alternative(
+        self, explanation: Explanation, other: Explanation, learned: Estimates, observations: ViewObservations
+    ) -> Explanation:
+        """A frame's explanation with one by other tracks, and what its evidence says of both."""
+        untracked = self._evidence(learned.rims.applied(observations), learned.population.body, None)
+        gain = likelihood_gain(untracked, explanation.people.candidates, other.people.candidates)
+        return replace(explanation, alternative=other, alternative_gain=gain)
 
     def _evidence(
         self, observations: ViewObservations, body: BodyConfig, predicted: PredictedTracks | None
@@ -213,3 +230,13 @@ class Detector:
         ]
         residual = reprojection_residuals(bodies, self.views, of_excluded, owners)
         return replace(explanation, residual=np.where(excluded, residual, explanation.residual))
+
+
+def _with_best_alternative(estimate: MapEstimate, untracked: FrameEvidence, people: Candidates) -> Explanation:
+    """The explanation by an estimate, and that by the people of a search without tracks where they differ most."""
+    explanation = explained_frame(estimate)
+    found = best_alternative(untracked, explanation.people.candidates, people)
+    if found is None:
+        return explanation
+    other = explained_frame(MapEstimate.of_members(estimate.evidence, found[0]))
+    return replace(explanation, alternative=other, alternative_gain=found[1])

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -35,6 +36,7 @@ from stseg.io.recording.frames import FrameSet
 from stseg.records.people import Explanation
 from stseg.records.tables import EVENT, SHIFT
 from stseg.trackers import Commit, FrameObservations, FusedFrame
+from stseg.trackers.alternative_tracks import AlternativeTracks
 from stseg.trackers.cut import CutTracker
 from stseg.view_health.blind_views import ExcludedViews, FrozenViews
 from stseg.view_health.image_shifts import image_shifts, shift_is_due
@@ -74,6 +76,7 @@ class Session:
         self._estimates = pipeline.detector.new_estimates()
         self._error_rates = pipeline.occupancy.new_error_rates()
         self._records: dict[int, FrameRecord] = {}
+        self._alternative = AlternativeTracks(pipeline.rig.frame_rate)
         self._factors, self._shifts = factors, dict[int, Rows]()
         self._fusion: Executor | None = None
         self._open: deque[Future[FusedEvidence]] = deque()
@@ -112,7 +115,9 @@ class Session:
         with self.watch.time("detection"):
             source = self.pipeline.proposals
             proposed = source.of(failures.kept(evidence), self._fuse_with_current_rates) if source else None
-            explanation = self.pipeline.detector.explain_next(self._estimates, frame, evidence, predicted, proposed)
+            detector, alternative = self.pipeline.detector, self._alternative.predict(frame)
+            explanation = detector.explain_next(self._estimates, frame, evidence, predicted, proposed, alternative)
+        explanation = self._decided(frame, explanation)
         events = self._excluded.events(frame, frame_set.views, evidence, failures)
         if explanation.unfinished:
             reason = f"{explanation.unfinished} candidates interact: not searched to the end"
@@ -133,6 +138,19 @@ class Session:
         with self.watch.time("tracking"):
             commits = self._tracker.finish()
         return [self._committed(commit) for commit in commits]
+
+    def _decided(self, frame: int, explanation: Explanation) -> Explanation:
+        """A frame's explanation, or its alternative if that is what happened; then frames before it are read anew."""
+        if not isinstance(self._tracker, CutTracker):
+            return explanation
+        decision = self._alternative.add(frame, explanation, self._tracker.filter)
+        if decision is None or explanation.alternative is None:
+            return explanation
+        for earlier in self._tracker.take(decision):
+            record, revised = self._records[earlier], decision.readings[earlier].explanation
+            revised = replace(revised, residual=record.explanation.residual)
+            self._records[earlier] = record._replace(explanation=revised)
+        return replace(explanation.alternative, residual=explanation.residual)
 
     def _committed(self, commit: Commit) -> CommittedFrames:
         return committed_frames(within_area(commit, self.pipeline.rig), self._records, self.watch)

@@ -62,10 +62,7 @@ def _keeps_its_cells(energy: GridEnergy) -> bool:
     return bool((energy.successor == still).all())
 
 
-SOLVERS = {
-    "stseg": Solver(minimum_cut, sparse_cut),
-    "pymaxflow": Solver(_pymaxflow_grid_cut, _pymaxflow_sparse_cut),
-}
+SOLVERS = {"stseg": Solver(minimum_cut, sparse_cut), "pymaxflow": Solver(_pymaxflow_grid_cut, _pymaxflow_sparse_cut)}
 """Their labels are equal bit for bit."""
 
 

@@ -1,12 +1,18 @@
 """Input and result of per-frame detection: view evidence; people, ghosts, and the assignment of boxes and pixels."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints
+from stseg.records.candidates import Candidates
 from stseg.records.sizes import Sizes
+
+SAME_PLACE = 0.2
+"""Distance below which people of two readings of a frame are one, metres."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,11 @@ class People:
     def __len__(self) -> int:
         return len(self.ground)
 
+    @property
+    def candidates(self) -> Candidates:
+        """Their places and sizes."""
+        return Candidates(self.ground, self.height, self.width)
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -59,3 +70,7 @@ class Explanation:
     nothing was measured."""
     unfinished: int = 0
     """Candidates of the largest group that was not searched to the end, 0 for none."""
+    alternative: Explanation | None = None
+    """The explanation by other people: those of the alternative tracks, or those of a search without tracks."""
+    alternative_gain: float | None = None
+    """Gain of the score without tracks by the alternative, nats; None where its people are the same."""

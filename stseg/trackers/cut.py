@@ -6,6 +6,7 @@ See docs/how-it-works.md, Energy and Tracks.
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import ClassVar
@@ -15,12 +16,16 @@ import numpy as np
 from stseg.arrays import Flags, Ints, Labels, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
+from stseg.geometry.distances import unmatched
 from stseg.graphcut.cut import greatest_empty_set
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.solvers import SOLVERS, find_solver
+from stseg.occupancy.revision import revised_volume
 from stseg.records.blobs import Blobs
+from stseg.records.people import SAME_PLACE
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sparse_labels import SparseLabels
+from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_labelling import WindowDetections, WindowLabels, label_cells
@@ -28,9 +33,10 @@ from stseg.segmentation.cell_motion import PlacedTracks, motion_field, same_trac
 from stseg.segmentation.cut_energy import build_energy
 from stseg.segmentation.label_energy import BodyShape
 from stseg.segmentation.patches import GroundPatches, mark_places, people_squares
+from stseg.trackers.alternative_tracks import AcceptedAlternative, Reading
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import TrackPlaces, event_rows, fill_views, trajectory_rows
-from stseg.trackers.window_existence import TrackedFrame, WindowExistence
+from stseg.trackers.window_existence import TrackedFrame, WindowExistence, people_at
 from stseg.tracking.filter.prediction import earlier_detections, predicted_places, together
 from stseg.tracking.filter.track_filter import TrackFilter
 from stseg.tracking.windows.tracklets import form_tracklets
@@ -65,6 +71,27 @@ class CutTracker:
     def solve_by(self, submit: Submit) -> None:
         """From now on have windows solved by `submit`, one after the other, perhaps in another thread meanwhile."""
         self._submit = submit
+
+    def take(self, decision: AcceptedAlternative) -> list[int]:
+        """Take other tracks, and their readings of frames that no window has decided; the numbers of these frames."""
+        self.filter, revised = decision.filter, []
+        for k, one in enumerate(self.open_frames):
+            frame = one.fused.frame
+            if frame >= self.committed and frame in decision.readings:
+                self.open_frames[k] = self._read_anew(one, decision.readings[frame])
+                revised.append(frame)
+        return revised
+
+    def _read_anew(self, one: TrackedFrame, reading: Reading) -> TrackedFrame:
+        """A frame by another reading."""
+        before, people = one.fused.people, reading.explanation.people
+
+        def revised() -> SparseVolume:
+            added = people_at(people, unmatched(people.ground, before.ground, SAME_PLACE))
+            return revised_volume(one.fused.volume, before.ground, people.ground, added, self.rig.grid, self.config)
+
+        ghosts = reading.explanation.ghosts
+        return TrackedFrame(replace(one.fused, people=people, ghosts=ghosts, made=revised), reading.tracks)
 
     def predict(self, frame: int) -> PredictedTracks | None:
         """Predictions of all tracks for a frame; None for the first."""

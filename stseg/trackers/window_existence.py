@@ -74,9 +74,9 @@ class WindowExistence:
         fused, number = one.fused, len(one.tracks)
         real = tracks > 0
         candidates = replace(one.candidates, evidence=log_odds)
-        people, ghosts = _at(candidates, np.flatnonzero(real)), _at(candidates, np.flatnonzero(~real))
+        people, ghosts = people_at(candidates, np.flatnonzero(real)), people_at(candidates, np.flatnonzero(~real))
         if not real[:number].all() or real[number:].any():
-            added = _at(candidates, number + np.flatnonzero(real[number:]))
+            added = people_at(candidates, number + np.flatnonzero(real[number:]))
             before, volume = fused.people.ground, fused.volume
             made = revised_volume(volume, before, people.ground, added, self.grid, self.config)
             fused = replace(fused, made=made)
@@ -154,7 +154,8 @@ def _joined(one: People, other: People) -> People:
     )
 
 
-def _at(people: People, chosen: Ints) -> People:
+def people_at(people: People, chosen: Ints) -> People:
+    """The chosen of them, int64 (k,)."""
     return People(
         people.ground[chosen],
         people.height[chosen],

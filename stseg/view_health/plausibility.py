@@ -64,10 +64,7 @@ def box_warnings(camera: Camera, grid: Grid, pixel: Floats, height: float) -> li
     given = _fitting_share(camera, grid, pixel, height)
     if given is None or given > _MISFITTING:
         return []
-    readings = {
-        "pixels of an image half as large": pixel * 2,
-        "pixels of an image twice as large": pixel / 2,
-    }
+    readings = {"pixels of an image half as large": pixel * 2, "pixels of an image twice as large": pixel / 2}
     shares = {words: _fitting_share(camera, grid, boxes, height) or 0.0 for words, boxes in readings.items()}
     words, share = max(shares.items(), key=lambda reading: reading[1])
     if share >= _FITTING:

@@ -63,13 +63,17 @@ class FrameSearch:
                 break
         return self._final(estimate)
 
-    def without_tracks(self, estimate: MapEstimate, untracked: FrameEvidence) -> MapEstimate:
-        """Repeat the search with the track prior removed (`untracked`), then with it, from the people so found.
+    def without_tracks(self, untracked: FrameEvidence) -> Candidates:
+        """The people of a search with the track prior removed (`untracked`)."""
+        result = self.whole(self.of_tracks(untracked))
+        return result.pool.at(result.members)
+
+    def repeated(self, estimate: MapEstimate, start: Candidates) -> MapEstimate:
+        """Repeat the search from people of a search without tracks.
 
         With few views many sets are better than all that exchange one or two members, and tracks lead into one of them.
         """
-        result = self.whole(self.of_tracks(untracked))
-        start, evidence = result.pool.at(result.members), estimate.evidence
+        evidence = estimate.evidence
         pool = start.joined_with(evidence.prior.pool()).joined_with(estimate.pool.at(estimate.members))
         return self._final(merged(MapEstimate.of_search(evidence, pool, np.arange(len(start)))))
 

@@ -64,9 +64,13 @@ class MapEstimate:
 
         `enumeration_limit` and `swap_sweeps` are the effort, see `stseg.detection.search.best_set`.
         """
+        return cls.of_members(evidence, pool).with_members(start)._searched(enumeration_limit, swap_sweeps)
+
+    @classmethod
+    def of_members(cls, evidence: FrameEvidence, pool: Candidates) -> MapEstimate:
+        """All of a pool as members, without a search."""
         bodies = ProjectedBodies.of(evidence.views, pool)
-        unsearched = cls(evidence, pool, bodies, evidence.problem(pool, bodies, None), start)
-        return unsearched._searched(enumeration_limit, swap_sweeps)
+        return cls(evidence, pool, bodies, evidence.problem(pool, bodies, None), np.arange(len(pool)))
 
     def _searched(self, enumeration_limit: int = 0, swap_sweeps: int = 0) -> MapEstimate:
         """The best set among the same candidates, from the members on."""

@@ -180,11 +180,7 @@ def _page(found: RigCheck) -> str:
     *grids, seen_by = found.pictures
     verdict = section("Verdict", *(note(escape(sentence)) for sentence in found.verdict))
     rows = [[escape(cell) for cell in row] for row in found.rows()]
-    numbers = section(
-        "Views",
-        table(COLUMNS, rows, len(rows)),
-        note(READING),
-    )
+    numbers = section("Views", table(COLUMNS, rows, len(rows)), note(READING))
     views = section("Ground and poles", figures(grids, "pair"), note("These pictures hold frames of the cameras."))
     ground = section("Coverage", figures([seen_by], "pair"))
     title = f"{found.recording.rig.name}: check of the rig"

@@ -8,6 +8,7 @@ just crossed.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,8 @@ _LEAST_EVIDENCE = -4.0
 """Evidence below which a rejected candidate starts no tentative track, nats."""
 _REPETITION_DISCOUNT = 2.0
 """Discount of a rejected candidate's evidence: consecutive frames are not independent, nats."""
+_NUMBERS_OF_BRANCH = 10_000
+"""Numbers that are left for tracks that begin beside a branch, which lasts for seconds."""
 EXCLUSION_RADIUS = 0.5
 """Radius around existing tracks within which no track begins and no place is interpolated, metres."""
 
@@ -169,6 +172,12 @@ class TrackFilter:
         self.begun = False
         self._expected: tuple[int, list[TrackState]] = (-1, [])
         """A frame, and the predictions of all tracks for it."""
+
+    def branch(self) -> TrackFilter:
+        """The same tracks, to be continued otherwise; those that begin there have other numbers."""
+        other = copy(self)
+        other.tracks, other.issued = [*self.tracks], self.issued + _NUMBERS_OF_BRANCH
+        return other
 
     def predict(self, frame: int) -> PredictedTracks | None:
         """Predictions of all tracks for a later frame; None before the first update."""

@@ -1,0 +1,58 @@
+"""Two readings of one frame: where they differ, and by how much its evidence alone prefers one of them.
+
+Tracks lead the search into the set of people that they predict. A search without tracks may find another set that
+explains the frame better; that is a reason to doubt, and none to change one's mind: a frame alone can often be read in
+two ways (`stseg.trackers.alternative_tracks` follows both).
+"""
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from stseg.arrays import Ints
+from stseg.detection.frame_evidence import FrameEvidence
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.geometry.distances import distances, unmatched
+from stseg.records.candidates import Candidates
+from stseg.records.people import SAME_PLACE
+
+_GROUP_DISTANCE = 1.0
+"""Distance below which differences depend on each other, metres."""
+_LEAST_GAIN = 2.0
+"""Least gain of an alternative that is worth following, nats."""
+
+
+def likelihood_gain(untracked: FrameEvidence, people: Candidates, alternative: Candidates) -> float | None:
+    """Gain of the score if people are exchanged for others, by the frame without tracks, nats; None for the same."""
+    estimate, differing = _both(untracked, people, alternative)
+    return _gain(estimate, differing) if len(differing) else None
+
+
+def best_alternative(
+    untracked: FrameEvidence, people: Candidates, alternative: Candidates
+) -> tuple[Candidates, float] | None:
+    """People with the exchange for which their frame has the most evidence, and its gain, nats; None for too little.
+
+    Differences of the alternative that are far from each other are exchanges of their own.
+    """
+    estimate, differing = _both(untracked, people, alternative)
+    ground = estimate.pool.ground[differing]
+    number, group = connected_components(distances(ground, ground) < _GROUP_DISTANCE, directed=False)
+    exchanges = [differing[group == k] for k in range(number)]
+    gains = [_gain(estimate, exchanged) for exchanged in exchanges]
+    if max(gains, default=0.0) <= _LEAST_GAIN:
+        return None
+    best = int(np.argmax(gains))
+    return estimate.pool.at(np.setxor1d(estimate.members, exchanges[best])), gains[best]
+
+
+def _both(untracked: FrameEvidence, people: Candidates, alternative: Candidates) -> tuple[MapEstimate, Ints]:
+    """An estimate with the people as members, before those whom only the alternative has; all who differ."""
+    lost = unmatched(people.ground, alternative.ground, SAME_PLACE)
+    more = alternative.at(unmatched(alternative.ground, people.ground, SAME_PLACE))
+    estimate = MapEstimate.of_members(untracked, people.joined_with(more))
+    differing = np.append(lost, len(people) + np.arange(len(more)))
+    return estimate.with_members(np.arange(len(people))), differing
+
+
+def _gain(estimate: MapEstimate, exchanged: Ints) -> float:
+    return estimate.with_members(np.setxor1d(estimate.members, exchanged)).total - estimate.total
