@@ -1,8 +1,7 @@
-"""Two readings of one frame: where they differ, and by how much its evidence alone prefers one of them.
+"""Two sets of people for one frame: where they differ, and the log-likelihood ratio by the frame without tracks.
 
 Tracks lead the search into the set of people that they predict. A search without tracks may find another set that
-explains the frame better; that is a reason to doubt, and none to change one's mind: a frame alone can often be read in
-two ways (`stseg.trackers.alternative_tracks` follows both).
+explains the frame better. One frame does not decide between them (`stseg.trackers.alternative_tracks` follows both).
 """
 
 import numpy as np
@@ -46,7 +45,7 @@ def best_alternative(
 
 
 def _both(untracked: FrameEvidence, people: Candidates, alternative: Candidates) -> tuple[MapEstimate, Ints]:
-    """An estimate with the people as members, before those whom only the alternative has; all who differ."""
+    """An estimate with the people as members, before those of the alternative alone; candidates of one set (k,)."""
     lost = unmatched(people.ground, alternative.ground, SAME_PLACE)
     more = alternative.at(unmatched(alternative.ground, people.ground, SAME_PLACE))
     estimate = MapEstimate.of_members(untracked, people.joined_with(more))

@@ -140,17 +140,17 @@ class Session:
         return [self._committed(commit) for commit in commits]
 
     def _decided(self, frame: int, explanation: Explanation) -> Explanation:
-        """A frame's explanation, or its alternative if that is what happened; then frames before it are read anew."""
+        """A frame's explanation, or an alternative that replaces the tracks: then in earlier frames, too."""
         if not isinstance(self._tracker, CutTracker):
             return explanation
         decision = self._alternative.add(frame, explanation, self._tracker.filter)
-        if decision is None or explanation.alternative is None:
+        if decision is None:
             return explanation
         for earlier in self._tracker.take(decision):
             record, revised = self._records[earlier], decision.readings[earlier].explanation
             revised = replace(revised, residual=record.explanation.residual)
             self._records[earlier] = record._replace(explanation=revised)
-        return replace(explanation.alternative, residual=explanation.residual)
+        return replace(decision.explanation, residual=explanation.residual)
 
     def _committed(self, commit: Commit) -> CommittedFrames:
         return committed_frames(within_area(commit, self.pipeline.rig), self._records, self.watch)

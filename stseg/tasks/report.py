@@ -122,6 +122,7 @@ def write_report(
     inputs: Inputs,
 ) -> list[Path]:
     """Write the page and its pictures, see `report`; the files that were written."""
+    run.require_consistency()
     rows = None if truth is None else read_tracks_csv(truth)
     true = None if rows is None else rows[np.isin(rows["frame"], run.frames)]
     frames = _frames(run, frame)

@@ -1,9 +1,9 @@
-"""A second reading of the people, followed beside the tracks until the evidence decides.
+"""An alternative hypothesis of the people, followed beside the tracks until the evidence decides.
 
 With few views two sets of people often explain a frame nearly as well, and the tracks keep to the one that they
-predict, though each frame is a little in favour of the other. So that one is followed, too, with tracks of its own, and
-the log-likelihood ratio of both readings by the frames alone is added up, as in Wald's sequential test (1945): once it
-is large enough the alternative is what happened, from the frame on at which it began.
+predict, though each frame is a little in favour of the other. So the other one is followed, too, with tracks of its
+own. The log-likelihood ratio of both by the frames without tracks is added up, as in Wald's sequential test (1945).
+Once it is large enough, the alternative replaces the tracks from the frame on at which it began.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ _ACCEPTED, _REJECTED = 15.0, -10.0
 _INDEPENDENT_INTERVAL = 0.2
 """Interval between frames that count as observations of their own, seconds: errors of silhouettes last."""
 _SAME_SECONDS = 0.4
-"""Time for which both readings agree before the alternative is dropped, seconds."""
+"""Time for which both hypotheses agree before the alternative is dropped, seconds."""
 _LONGEST = 3.0
 """Time within which it must be decided, seconds."""
 
@@ -32,20 +32,21 @@ class Reading(NamedTuple):
 
 
 class AcceptedAlternative(NamedTuple):
-    """The alternative that is what happened."""
+    """An alternative with enough evidence."""
 
     filter: TrackFilter
     """Its tracks, before the current frame."""
     readings: Mapping[int, Reading]
     """Its readings of earlier frames, by their number."""
+    explanation: Explanation
+    """Its explanation of the current frame."""
 
 
 class AlternativeTracks:
     """The alternative of a session, if there is one at present."""
 
     def __init__(self, frame_rate: float) -> None:
-        self._frame_rate = frame_rate
-        self._weight = min(1.0, 1.0 / (frame_rate * _INDEPENDENT_INTERVAL))
+        self._frame_rate, self._weight = frame_rate, min(1.0, 1.0 / (frame_rate * _INDEPENDENT_INTERVAL))
         self._filter: TrackFilter | None = None
         self._last: tuple[int, Explanation] | None = None
         self._readings: dict[int, Reading] = {}
@@ -67,17 +68,16 @@ class AlternativeTracks:
         `tracks` are the current ones, from which an alternative begins.
         """
         other, gain = explanation.alternative, explanation.alternative_gain
-        if self._filter is None and other is not None:
-            self._filter, self._readings = tracks.branch(), {}
-            self._begin, self._gain = frame, 0.0
-        if self._filter is None or other is None:
+        if other is None:
             self._filter = None
             return None
+        if self._filter is None:
+            self._filter, self._readings, self._begin, self._gain = tracks.branch(), {}, frame, 0.0
         self._last = frame, other
         if gain is not None:
             self._differed, self._gain = frame, self._gain + self._weight * gain
         if self._gain > _ACCEPTED:
-            decision, self._filter = AcceptedAlternative(self._filter, self._readings), None
+            decision, self._filter = AcceptedAlternative(self._filter, self._readings, other), None
             return decision
         is_over = frame - self._begin > _LONGEST * self._frame_rate
         if is_over or self._gain < _REJECTED or frame - self._differed >= _SAME_SECONDS * self._frame_rate:

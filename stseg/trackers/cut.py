@@ -73,7 +73,7 @@ class CutTracker:
         self._submit = submit
 
     def take(self, decision: AcceptedAlternative) -> list[int]:
-        """Take other tracks, and their readings of frames that no window has decided; the numbers of these frames."""
+        """Replace the tracks, and the people of frames that no window has decided; the numbers of these frames."""
         self.filter, revised = decision.filter, []
         for k, one in enumerate(self.open_frames):
             frame = one.fused.frame

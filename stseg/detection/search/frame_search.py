@@ -20,7 +20,7 @@ from stseg.detection.search.restarts import restarted
 from stseg.records.candidates import Candidates
 
 _MINIMUM_FITTED_GAIN = -15.0
-"""Gain above which an alternative is fitted to its pixels, nats: what the right place and size may add."""
+"""Gain above which a rejected candidate is fitted to its pixels, nats: what the right place and size may add."""
 _MINIMUM_FITTED_EVIDENCE = 2.0
 """Summed evidence of all views above which it is, nats: less is no foreground that is left unexplained."""
 
@@ -92,22 +92,22 @@ class FrameSearch:
         moved = estimate.searched_with(refined, np.arange(number, number + len(refined)))
         if self.has_boxes:
             moved = restarted(moved, self.lattice_ground)
-        alternatives = moved.alternatives()
-        pool = moved.pool.at(np.concatenate([moved.members, alternatives]))
+        rejected = moved.best_rejected()
+        pool = moved.pool.at(np.concatenate([moved.members, rejected]))
         if not self.has_boxes:
-            pool = pool.joined_with(_fitted(moved, alternatives))
+            pool = pool.joined_with(_fitted(moved, rejected))
         start = np.arange(len(moved.members))
         return merged(MapEstimate.of_search(moved.evidence, pool, start, ENUMERATION_LIMIT, self.swap_sweeps))
 
 
-def _fitted(estimate: MapEstimate, alternatives: Ints) -> Candidates:
-    """Alternatives that are nearly worth a member, at the places and sizes that their own pixels show.
+def _fitted(estimate: MapEstimate, rejected: Ints) -> Candidates:
+    """Rejected candidates that are nearly worth a member, at the places and sizes that their own pixels show.
 
     The lattice tries few heights and one width of each: a child is worth less than nothing at the size of an adult.
     """
-    additions = estimate.additions(alternatives)
+    additions = estimate.additions(rejected)
     evidence = additions.view_evidence.sum(0)
-    chosen = alternatives[(additions.gain > _MINIMUM_FITTED_GAIN) & (evidence > _MINIMUM_FITTED_EVIDENCE)]
+    chosen = rejected[(additions.gain > _MINIMUM_FITTED_GAIN) & (evidence > _MINIMUM_FITTED_EVIDENCE)]
     if not len(chosen):
         return estimate.pool.at(chosen)
     together = estimate.with_members(np.concatenate([estimate.members, chosen]))

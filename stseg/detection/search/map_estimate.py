@@ -135,7 +135,7 @@ class MapEstimate:
         """Loss of score without each member, nats, float64 (n,)."""
         return self.members_score.gain
 
-    def alternatives(self) -> Ints:
+    def best_rejected(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
         distance, count = 2 * self.evidence.prior.config.lattice_spacing, len(self.members)
         order = self.others[np.argsort(-self.other_additions.gain, kind="stable")]
