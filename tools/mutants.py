@@ -6,17 +6,18 @@
 A mutant lacks one check: a condition that raises is never true, a call that requires or locks is left out, an escape
 returns its text, one part of a question `is_...` is always right, a flag of `open` is not given. In a copy below build/
 the tests run once while every check is watched, also in the processes that they start: a check that refuses something
-notes the test. Then the checks are broken, one after the other, and the tests of their notes run until one fails.
+notes the test. Then the checks are broken, one after the other, and the tests of their notes run until one fails. Tests
+that fail under watch do not count. No process may have more than 6 GiB of data: some checks bound memory.
 With `--fuzz` all targets of fuzzing take the tests' place, for five minutes; then, for so many seconds, the target in
-which the broken check refused most often. Checks that refuse in none are not broken. Where fuzzing without a check ends
-without a failure, and takes or refuses all files of its notes, ten or more, as with it, others refuse them: the check
-makes no difference, and is no part of the share.
+which the broken check refused most often. Checks that refuse in none are not broken. A check makes no difference, and
+is no part of the share, where fuzzing without it fails nowhere and answers all files of its notes, ten or more, alike.
 """
 
 import argparse
 import ast
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -33,8 +34,8 @@ ESCAPES = ("printable", "escape", "abbreviated", "mask_passwords", "quote")
 PREFIXES = ("require", "refuse", "flock", "lockf", "verify", "check")
 FLAGS = ("O_NOFOLLOW", "O_EXCL", "O_NONBLOCK")
 COPY = ROOT / "build" / "mutants"
-NOTES, ANSWERS = COPY / "notes", COPY / "answers"
-LEAST_FILES = 10
+NOTES, ANSWERS, SAID = COPY / "notes", COPY / "answers", COPY / "said"
+LEAST_FILES, MOST_DATA = 10, 6 << 30
 TESTS = ("-m", "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider")
 FUZZING = ("tools/fuzzing.py", "--minutes")
 WATCH = f"""
@@ -113,13 +114,13 @@ def watched(place: str, text: str) -> str:
 
 
 def passes(words: Sequence[str], seconds: float | None = None) -> bool:
-    """Whether a program of Python passes in the copy."""
+    """Whether a program of Python passes in the copy; what it says stands in SAID."""
     noted = {"FUZZ_ANSWERS": str(ANSWERS)} if words[0] == FUZZING[0] else {}
     own = os.environ | {"PYTHONPATH": str(COPY)} | noted
-    sink, program = None if seconds is None else subprocess.DEVNULL, [sys.executable, *words]
     ANSWERS.unlink(missing_ok=True)
-    with suppress(subprocess.TimeoutExpired):
-        return subprocess.run(program, cwd=COPY, env=own, timeout=seconds, stdout=sink, check=False).returncode == 0
+    with SAID.open("w") as said, suppress(subprocess.TimeoutExpired):
+        program = [sys.executable, *words]
+        return subprocess.run(program, cwd=COPY, env=own, timeout=seconds, stdout=said, check=False).returncode == 0
     return False
 
 
@@ -136,6 +137,7 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=5, help="most functions of tests for a check")
     parser.add_argument("--fuzz", type=float, help="seconds of fuzzing for each check, in place of tests")
     given, words = parser.parse_known_args()
+    resource.setrlimit(resource.RLIMIT_DATA, (MOST_DATA, MOST_DATA))
     names = subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).splitlines()
     for name in names:
         (COPY / name).parent.mkdir(parents=True, exist_ok=True)
@@ -147,14 +149,16 @@ def main() -> None:
         (COPY / name).write_text(watched(name, text))
     NOTES.unlink(missing_ok=True)
     passes([*FUZZING, "5"] if given.fuzz else [*TESTS, *words])
+    told = [line.split(" ") for line in SAID.read_text().splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    failed = {test.partition("[")[0] for _, test, *_ in told}
     before, tests, files = answers(), defaultdict[str, Counter[str]](Counter), defaultdict[str, set[str]](set)
     for noted, test in (line.split(" ", 1) for line in NOTES.read_text().splitlines() if " " in line.rstrip()):
         files[noted].add(test)
         tests[noted][test.partition("[")[0].partition(" ")[0]] += 1
     for name, text in texts.items():
         (COPY / name).write_text(text)
-    every = [(name, k) for name, text in texts.items() for k, _ in enumerate(checks(ast.parse(text)))]
-    every = [one for one in every if one[0].startswith(given.only)]
+    own = {name: text for name, text in texts.items() if name.startswith(given.only)}
+    every = [(name, k) for name, text in own.items() for k, _ in enumerate(checks(ast.parse(text)))]
     every = [one for one in every if not given.fuzz or f"{one[0]}#{one[1]}" in tests]
     chosen, verdicts = random.Random(given.every).sample(every, len(every) // given.every), Counter[str]()
     for name, number in sorted(chosen):
@@ -163,7 +167,7 @@ def main() -> None:
         check.replace(check.without)
         (COPY / name).write_text(ast.unparse(ast.fix_missing_locations(tree)))
         key = f"{name}#{number}"
-        seen = [test for test, _ in tests[key].most_common(given.most)]
+        seen = [test for test, _ in tests[key].most_common() if test not in failed][: given.most]
         run = [*FUZZING, str(given.fuzz / 60), "--first", "--target", seen[0]] if given.fuzz else [*TESTS, "-x", *seen]
         verdict = "noticed" if seen and not passes(run, (given.fuzz or 0) + 300) else "missed"
         common = files[key] & before.keys() & (after := answers()).keys()
