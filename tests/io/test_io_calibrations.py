@@ -12,6 +12,7 @@ from strategies import BARREL, Pose, poses
 from stseg import Camera, errors, read_recording
 from stseg.arrays import Floats
 from stseg.commands.calibrate.app import app
+from stseg.commands.calibrate.importing import _named
 from stseg.errors import CalibrationError, ConfigError, FormatError
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.matrices import read_projection
@@ -276,6 +277,8 @@ class TestCommand:
         Path("left/left/config.xml").write_text(whole())
         files = (calibrations[0], "left/left/config.xml")
         refused(ConfigError, r"--names: found files and folders that share", calibrate, "opencv", *files, *options)
+        twice = read_opencv_xml([Path(files[0])]) * 2
+        refused(ConfigError, "found 2 cameras in 1 files, not all with a name", _named, twice, files[:1], None)
 
     def test_an_own_rig_is_replaced(self, calibrations: list[str]) -> None:
         tokens = ("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml")

@@ -17,6 +17,7 @@ from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.recording.video.avi_index import lost_frames
 from stseg.io.runfile.runs import read_run
+from stseg.tasks.sources import summarise_sources
 
 FRAMES, SIZE = 600, (48, 32)
 NOISE = np.random.default_rng(1).integers(0, 40, (SIZE[1], SIZE[0], 3))
@@ -73,7 +74,8 @@ def test_a_run_warns_of_lost_frames_and_refuses_one_file_twice(tmp_path: Path) -
     assert [one for one in run.warnings if "image" in one] == ["left: no image of frames 4 to 6: lost or damaged?"]
     video = CameraSource(Source("video", write_at_rate(tmp_path / "a.avi", pictures()[:3])))
     twins = blank_recording(video, video, size=SIZE)
-    refused(SourceError, "a.avi: camera cam2: found the source of camera cam1 too", index_streams, twins)
+    for look in (index_streams, summarise_sources):
+        refused(SourceError, "a.avi: camera cam2: found the source of camera cam1 too", look, twins)
     coco = [CameraSource(Source("boxes", tmp_path / "a.json", select=name)) for name in ("", "", "cam3/*")]
     match = "camera cam2: found .* or its part by select or view"
     refused(SourceError, match, require_own_sources, blank_recording(*coco))

@@ -157,6 +157,9 @@ def test_what_cannot_be_followed_is_refused(arriving: Path, source: Source) -> N
     assert not is_live(recording) and is_live(live())
     other = replace(recording, sources=(CameraSource(source), *recording.sources[1:]))
     refused(SourceError, "by a pattern", is_live, other)
+    late = replace(recording, sources=tuple(replace(one, offset=9) for one in recording.sources))
+    starts = "camera west, frame 8: found a stream that starts at frame 9"
+    refused(SourceError, starts, FollowedFiles, late, 8, None, QUICK, FileNotes(Path("files.json")), Event(), print)
 
 
 def numbered(number: int, count: int = 200) -> list[Bytes]:

@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from fcntl import LOCK_EX, flock
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -332,6 +333,9 @@ def test_what_is_no_run_file_and_no_table_is_told(tmp_path: Path, run_path: Path
         del file["boxes"]
         file.create_group("boxes")
     refused(FormatError, "/boxes: found no array", read_run, run_path)
+    with run_path.open("rb") as file:
+        flock(file, LOCK_EX)
+        refused(FormatError, "still being written", read_run, run_path)
     run_path.write_bytes(run_path.read_bytes()[:-3000])
     refused(FormatError, "whole run file", read_run, run_path)
 
