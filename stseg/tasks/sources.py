@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +31,8 @@ _OUTSIDE_SHARE = 0.5
 """Share of feet outside the area from which there is a warning."""
 _BEYOND_SHARE = 0.05
 """The same of boxes that begin beyond the right or lower edge of the image."""
+_FOOT, _FOOT_OF_CENTRE = (0.5, 1.0), (0.0, 0.5)
+"""From left and top to the middle of the lower edge, in widths and heights; the same if they are a box's centre."""
 
 
 @dataclass(frozen=True)
@@ -46,22 +47,18 @@ class SourceSummary:
     height: float
     """Mean height of a body, metres."""
 
-    @cached_property
-    def in_area(self) -> Flags:
-        """Whether the middle of each box's lower edge projects into the ground rectangle, bool (n,)."""
-        pixel, grid = self.boxes, self.grid
-        foot = self.camera.back_project(np.stack([pixel[:, 0] + pixel[:, 2] / 2, pixel[:, 1] + pixel[:, 3]], -1))
+    def ground(self, foot: tuple[float, float] = _FOOT) -> tuple[Floats, Flags]:
+        """Where each foot projects, float64 (n, 2), metres; whether that is in the ground rectangle, bool (n,)."""
+        grid, ground = self.grid, self.camera.back_project(self.boxes[:, :2] + self.boxes[:, 2:] * foot)
         with np.errstate(invalid="ignore"):
-            inside = (foot > [grid.x[0], grid.y[0]]) & (foot < [grid.x[1], grid.y[1]])
-        return np.asarray(inside.all(axis=1))
+            inside = (ground > [grid.x[0], grid.y[0]]) & (ground < [grid.x[1], grid.y[1]])
+        return ground, inside.all(axis=1)
 
-    @property
-    def feet(self) -> tuple[Ints, Floats]:
+    def feet(self, foot: tuple[float, float] = _FOOT) -> tuple[Ints, Floats]:
         """Frames of the recording (n,) and places (n, 2), metres, of the boxes that stand in the area."""
-        pixel, within = self.boxes[self.in_area], self.in_area
-        foot = np.stack([pixel[:, 0] + pixel[:, 2] / 2, pixel[:, 1] + pixel[:, 3]], -1)
+        ground, within = self.ground(foot)
         frame = np.zeros(0, np.int64) if self.detections is None else self.detections.kept.frame[within]
-        return frame + self.source.offset, self.camera.back_project(foot)
+        return frame + self.source.offset, ground[within]
 
     @property
     def boxes(self) -> Floats:
@@ -81,7 +78,7 @@ class SourceSummary:
             f"{len(pixel) / max(found.frames, 1):.1f}",
             _span(pixel[:, 3], "{:.0f}"),
             _span(found.kept.score, "{:.2f}"),
-            f"{100 * self.in_area.mean():.0f} %" if len(pixel) else "",
+            f"{100 * self.ground()[1].mean():.0f} %" if len(pixel) else "",
             ", ".join(f"{name} {count}" for name, count in list(found.read.classes().items())[:5]),
         )
 
@@ -92,7 +89,7 @@ class SourceSummary:
             return
         if int(found.kept.frame.min()) == 1 and int(found.read.frame.min()) == 1:
             yield f"{name}: its first frame with detections is 1: do its frames count from 1? (first_frame = 1)"
-        outside = 1 - float(self.in_area.mean())
+        outside = 1 - float(self.ground()[1].mean())
         if outside > _OUTSIDE_SHARE:
             yield (
                 f"{name}: {100 * outside:.0f} % of its feet project outside the area: "
@@ -133,13 +130,14 @@ def body_height(recording: Recording) -> float:
 def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary]) -> list[str]:
     """One sentence for each number of a rig or its boxes that is probably a mistake."""
     names, rig = [camera.name for camera in recording.rig.cameras], recording.rig
-    paces = (words for one in summaries for words in pace_warnings(rig.frame_rate, *one.feet, one.height))
+    feet, by_centres = ([one.feet(foot) for one in summaries] for foot in (_FOOT, _FOOT_OF_CENTRE))
+    paces = (words for one in feet for words in pace_warnings(rig.frame_rate, *one, body_height(recording)))
     return [
         *scene_warnings(rig, body_height(recording)),
         *(words for summary in summaries for words in summary.warnings()),
         *twin_warnings(names, [summary.boxes for summary in summaries]),
         *list(paces)[:1],
-        *agreement_warnings(rig.cameras, *zip(*(one.feet for one in summaries), strict=True)),
+        *agreement_warnings(rig.cameras, feet, by_centres),
     ]
 
 

@@ -24,30 +24,33 @@ _LEAST_FEET, _FRAMES = 50, 200
 """Least number of feet for a statement, and number of frames that are looked at."""
 
 
-def agreement_warnings(cameras: Sequence[Camera], frames: Sequence[Ints], feet: Sequence[Floats]) -> list[str]:
+Feet = Sequence[tuple[Ints, Floats]]
+"""Frames int64 (n,) of each camera's boxes, and where they stand, float64 (n, 2), metres."""
+
+
+def agreement_warnings(cameras: Sequence[Camera], feet: Feet, by_centres: Feet) -> list[str]:
     """A warning that names the cameras whose feet meet those of other cameras no more often than by chance.
 
-    Parameters
-    ----------
-    cameras
-    frames : int64 (n,) of each camera
-        Frames of its boxes.
-    feet : float64 (n, 2) of each camera
-        Where they stand, metres.
+    Where they meet if each box's left and top are its centre, `by_centres`, it asks for that.
     """
-    view = np.repeat(np.arange(len(cameras)), [len(frame) for frame in frames])
-    frame, ground = np.concatenate([*frames, np.zeros(0, np.int64)]), np.concatenate([*feet, np.zeros((0, 2))])
-    order = np.argsort(frame, kind="stable")
-    view, frame, ground = view[order], frame[order], ground[order]
-    strangers = [
-        camera.name
-        for k, camera in enumerate(cameras)
-        if _is_stranger(k, _visible(k, cameras, ground), view, frame, ground)
-    ]
+    strangers = _strangers(cameras, feet)
     if not strangers:
         return []
+    some = [(by_centres if k in strangers else feet)[k] for k in range(len(cameras))]
     remedy = "are its file, first frame, columns, image size and lower edges of boxes right?"
-    return [f"{', '.join(strangers)}: people stand where other cameras see them no more often than by chance: {remedy}"]
+    if not (_strangers(cameras, some) and _strangers(cameras, by_centres)):
+        remedy = "are left and top the centres of its boxes? (name these columns x and y)"
+    names = ", ".join(cameras[k].name for k in strangers)
+    return [f"{names}: people stand where other cameras see them no more often than by chance: {remedy}"]
+
+
+def _strangers(cameras: Sequence[Camera], feet: Feet) -> list[int]:
+    view = np.repeat(np.arange(len(cameras)), [len(frame) for frame, _ in feet])
+    frame, ground = np.concatenate([one for one, _ in feet]), np.concatenate([one for _, one in feet])
+    order = np.argsort(frame, kind="stable")
+    view, frame, ground = view[order], frame[order], ground[order]
+    places = [_visible(k, cameras, ground) for k in range(len(cameras))]
+    return [k for k, visible in enumerate(places) if _is_stranger(k, visible, view, frame, ground)]
 
 
 def _visible(index: int, cameras: Sequence[Camera], ground: Floats) -> Flags:

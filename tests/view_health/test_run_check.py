@@ -227,10 +227,11 @@ def test_what_is_right_is_not_doubted_but_a_pace_of_nobody(
     kept = replace(recording, rig=replace(recording.rig, frame_rate=1.3 * recording.rig.frame_rate))
     assert not warnings_of(kept, summaries, lambda boxes, _: boxes * chance.normal(1, 0.03, boxes.shape))
     for one in summaries:
-        assert "are frame_rate and" in pace_warnings(1000 * recording.rig.frame_rate, *one.feet, HEIGHT)[0]
+        assert "are frame_rate and" in pace_warnings(1000 * recording.rig.frame_rate, *one.feet(), HEIGHT)[0]
 
 
 SHIFTED = "people stand where other cameras see them no more often than by chance"
+CENTRES = SHIFTED + ": are left and top the centres of its boxes?"
 
 
 @pytest.mark.parametrize(
@@ -240,7 +241,7 @@ SHIFTED = "people stand where other cameras see them no more often than by chanc
         (lambda boxes, _: np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]]), "corners x1, y1, x2, y2"),
         (lambda boxes, _: boxes / 2, "an image half as large"),
         (lambda boxes, _: 2 * boxes, "boxes begin beyond the image"),
-        (lambda boxes, _: np.hstack([boxes[:, :2] + boxes[:, 2:] / 2, boxes[:, 2:]]), SHIFTED),
+        (lambda boxes, _: np.hstack([boxes[:, :2] + boxes[:, 2:] / 2, boxes[:, 2:]]), CENTRES),
         (lambda boxes, _: np.hstack([boxes[:, :2] - 3 * boxes[:, 2:], boxes[:, 2:]]), "project outside the area"),
         (lambda boxes, _: boxes * [1, 1, 0, 1], "less than a pixel wide"),
         (lambda boxes, _: boxes * [1, 1, 1, 1 / 4] + boxes[:, 3:] * [0, 3 / 4, 0, 0], "fit a body on the ground: are"),

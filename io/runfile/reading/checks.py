@@ -15,6 +15,7 @@ from stseg.io.runfile import layout
 from stseg.io.runfile.reading.hdf5_reading import read_attribute
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import EXPECTED, abbreviated, is_name
+from stseg.records.tables import ERROR_RATES
 
 _RANGES: dict[str, tuple[int, int]] = {
     "frame": (0, limits.FRAMES),
@@ -31,6 +32,8 @@ _RANGES: dict[str, tuple[int, int]] = {
 """Columns of whole numbers; `view` counts the cameras."""
 _PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "height"), "ghosts": ("x", "y", "evidence")}
 """Columns that must be finite; others may be NaN where nothing is known."""
+_NOT_NEGATIVE = ("xx", "yy", "height", "width", "extent", "seconds", *ERROR_RATES)
+"""Variances, sizes, durations and rates."""
 
 
 @dataclass(frozen=True)
@@ -127,8 +130,9 @@ def require_table(bounds: Bounds, name: str, rows: Rows) -> Rows:
     """The rows of a table, checked; raises FormatError with the table, the column and the value."""
     for column, wrong, expected in _wrong_values(bounds, name, rows):
         if wrong.any():
-            value = rows[column][int(np.argmax(wrong.reshape(len(rows), -1).any(axis=1)))]
-            raise FormatError(bounds.path, f"/{name}, {column}", str(value)[: limits.NAME], expected)
+            row = int(np.argmax(wrong.reshape(len(rows), -1).any(axis=1)))
+            found = str(rows[column][row])[: limits.NAME]
+            raise FormatError(bounds.path, f"/{name}, {column}, row {row}", found, expected)
     if name in ("trajectory", "boxes") and _repeated(rows):
         raise FormatError(bounds.path, f"/{name}", "a track twice in a frame", "once, or once a view")
     if name == "known_people" and _repeated(rows):
@@ -143,9 +147,9 @@ def _wrong_values(bounds: Bounds, name: str, rows: Rows) -> Iterator[tuple[str, 
         if values.dtype.kind == "S":
             yield column, _unprintable(values), "printable text"
         elif values.dtype.kind == "f":
-            finite = column in _PLACES.get(name, ())
-            fits = np.abs(values) <= limits.NUMBER
-            yield column, ~(fits if finite else fits | ~np.isfinite(values)), "a finite number of usual size"
+            low, high = 0.0 if column in _NOT_NEGATIVE else -limits.NUMBER, limits.NUMBER
+            given = ~np.isnan(values) | (column in _PLACES.get(name, ()))
+            yield column, given & ~((low <= values) & (values <= high)), f"a number from {low:g} to {high:g}"
         elif column == "view":
             yield column, (values < 0) | (values >= bounds.cameras), f"a view below {bounds.cameras}"
         elif column in _RANGES and values.dtype.kind in "iu":
@@ -158,14 +162,8 @@ def _wrong_values(bounds: Bounds, name: str, rows: Rows) -> Iterator[tuple[str, 
 def _unprintable(values: AnyArray) -> Flags:
     """Texts that are no printable UTF-8, bool (n,)."""
     kinds, index = np.unique(values, return_inverse=True)
-    return np.array([not _is_printable(bytes(text)) for text in kinds], bool)[index]
-
-
-def _is_printable(text: bytes) -> bool:
-    try:
-        return text.decode("utf-8").isprintable()
-    except UnicodeDecodeError:
-        return False
+    escaped = [bytes(text).decode("utf-8", "surrogateescape") for text in kinds]  # escapes are not printable
+    return np.array([not text.isprintable() for text in escaped], bool)[index]
 
 
 def _repeated(rows: Rows) -> bool:
