@@ -11,6 +11,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.errors import printable
+from stseg.io.exports.row_counts import require_sound_pages
 from stseg.io.extras import load_extra
 from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile.reading.run_reader import Run
@@ -41,6 +42,8 @@ def write_sqlite(path: Path, runs: Sequence[Run]) -> None:
             connection.execute("PRAGMA journal_mode = OFF")  # nothing lies beside the part of a killed command
             with connection:
                 rows = _fill(connection, runs)
+        with closing(sqlite3.connect(path)) as connection:
+            require_sound_pages(connection)
             _require_rows(connection, rows)
     except sqlite3.Error as error:
         raise OSError(errno.EIO, str(error)) from error
@@ -61,6 +64,8 @@ def write_duckdb(path: Path, runs: Sequence[Run]) -> None:
             connection.execute("CHECKPOINT")
         log.unlink(missing_ok=True)  # on a full disk the rows may be in it alone, and closing says nothing
         with duckdb.connect(str(path), read_only=True) as connection:
+            for table in rows:  # a count alone reads no rows
+                connection.execute(f"SELECT BIT_XOR(HASH({table})) FROM {table}").fetchall()
             _require_rows(connection, rows)
     except duckdb.Error as error:
         raise OSError(errno.EIO, str(error).partition("\n")[0]) from error

@@ -2,6 +2,7 @@
 
 import errno
 import sqlite3
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,7 +75,7 @@ def write_tracks(to: str, path: Path, run: Run) -> None:
     try:
         FORMATS[to].write(path, run)
         found, rows = ROW_COUNTS[to](path), len(getattr(run, FORMATS[to].rows))
-    except (sqlite3.Error, BadZipFile, ValueError, KeyError) as error:
+    except (sqlite3.Error, zlib.error, BadZipFile, ValueError, KeyError) as error:
         raise OSError(errno.EIO, str(error)) from error
     if found != rows:
         raise OSError(errno.EIO, f"{found} of {rows} rows after writing")

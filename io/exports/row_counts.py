@@ -4,6 +4,7 @@ import json
 import sqlite3
 from collections.abc import Callable, Mapping
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -15,27 +16,18 @@ from stseg.io.extras import load_extra
 
 def _of_text(path: Path) -> int:
     with path.open("rb") as file:
-        return sum(line[:1].isdigit() for line in file)
+        return sum(line[:1].isdigit() and line.endswith(b"\n") for line in file)
 
 
 def _of_parquet(path: Path) -> int:
     parquet = load_extra("pyarrow.parquet", "parquet")
     with path.open("rb") as file:
-        return int(parquet.read_table(file, columns=[]).num_rows)
+        return int(parquet.read_table(file).num_rows)
 
 
-def _of_mot_boxes(path: Path) -> int:
+def _of_members(path: Path, mark: bytes) -> int:
     with ZipFile(path) as archive:
-        return sum(archive.read(name).count(b"\n") for name in archive.namelist())
-
-
-def _of_coco(path: Path) -> int:
-    return len(json.loads(path.read_bytes())["annotations"])
-
-
-def _of_cvat(path: Path) -> int:
-    with ZipFile(path) as archive:
-        return sum(archive.read(name).count(b' outside="0" ') for name in archive.namelist())
+        return sum(archive.read(name).count(mark) for name in archive.namelist())
 
 
 def _of_label_studio(path: Path) -> int:
@@ -52,7 +44,14 @@ def _of_wildtrack(path: Path) -> int:
 
 def _of_jupedsim(path: Path) -> int:
     with closing(sqlite3.connect(path)) as database:
+        require_sound_pages(database)
         return int(database.execute("SELECT COUNT(*) FROM trajectory_data").fetchone()[0])
+
+
+def require_sound_pages(database: sqlite3.Connection) -> None:
+    """Raise sqlite3.DatabaseError unless all pages of a database hold what their headers say."""
+    if said := [str(words) for (words,) in database.execute("PRAGMA quick_check") if words != "ok"]:
+        raise sqlite3.DatabaseError(said[0])
 
 
 def _of_movement(path: Path) -> int:
@@ -61,8 +60,7 @@ def _of_movement(path: Path) -> int:
 
 
 def _of_moving_features(path: Path) -> int:
-    features = json.loads(path.read_bytes())["features"]
-    return sum(len(one["temporalGeometry"]["datetimes"]) for one in features)
+    return sum(len(one["temporalGeometry"]["datetimes"]) for one in json.loads(path.read_bytes())["features"])
 
 
 def _of_geojson(path: Path) -> int:
@@ -75,9 +73,9 @@ ROW_COUNTS: Mapping[str, Callable[[Path], int]] = {
     **dict.fromkeys(("csv", "mot", "pedpy", "napari"), _of_text),
     **dict.fromkeys(("movement", "movement-boxes"), _of_movement),
     "parquet": _of_parquet,
-    "mot-boxes": _of_mot_boxes,
-    "coco": _of_coco,
-    "cvat": _of_cvat,
+    "mot-boxes": partial(_of_members, mark=b"\n"),
+    "coco": lambda path: len(json.loads(path.read_bytes())["annotations"]),
+    "cvat": partial(_of_members, mark=b' outside="0" '),
     "label-studio": _of_label_studio,
     "wildtrack": _of_wildtrack,
     "jupedsim": _of_jupedsim,

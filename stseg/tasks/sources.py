@@ -52,7 +52,7 @@ class SourceSummary:
         grid, ground = self.grid, self.camera.back_project(self.boxes[:, :2] + self.boxes[:, 2:] * foot)
         with np.errstate(invalid="ignore"):
             inside = (ground > [grid.x[0], grid.y[0]]) & (ground < [grid.x[1], grid.y[1]])
-        return ground, inside.all(axis=1)
+        return ground, np.asarray(inside.all(axis=1))
 
     def feet(self, foot: tuple[float, float] = _FOOT) -> tuple[Ints, Floats]:
         """Frames of the recording (n,) and places (n, 2), metres, of the boxes that stand in the area."""
@@ -147,10 +147,8 @@ def write_source_pictures(recording: Recording, summaries: list[SourceSummary], 
     inputs = Inputs(recording_files(recording))
     counts = [one.detections.frames for one in summaries if one.detections is not None]
     frame, pictured = min(counts) // 2 if counts else 0, recording.pictured()
-    views: tuple[Observation, ...] = (None,) * len(summaries)
     with open_frames(pictured, frame, frame + 1) as frame_sets:
-        for frame_set in frame_sets:
-            views = frame_set.views
+        views = next((frame_set.views for frame_set in frame_sets), (None,) * len(summaries))
     for summary, view in zip(summaries, views, strict=True):
         picture = png_bytes(summary.picture(view, frame))
         write_png(folder / f"{summary.camera.name}.png", picture, overwrite, inputs)

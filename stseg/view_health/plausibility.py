@@ -64,12 +64,11 @@ def box_warnings(camera: Camera, grid: Grid, pixel: Floats, height: float) -> li
     given = _fitting_share(camera, grid, pixel, height)
     if given is None or given > _MISFITTING:
         return []
-    readings = {"pixels of an image half as large": pixel * 2, "pixels of an image twice as large": pixel / 2}
-    shares = {words: _fitting_share(camera, grid, boxes, height) or 0.0 for words, boxes in readings.items()}
-    words, share = max(shares.items(), key=lambda reading: reading[1])
+    readings = {"half": pixel * 2, "twice": pixel / 2}
+    share, scale = max((_fitting_share(camera, grid, boxes, height) or 0.0, scale) for scale, boxes in readings.items())
     if share >= _FITTING:
         fit = f"{100 * given:.0f} % of its boxes fit a body on the ground"
-        return [f"{camera.name}: {fit}, and {100 * share:.0f} % if they are {words}"]
+        return [f"{camera.name}: {fit}, and {100 * share:.0f} % if they are pixels of an image {scale} as large"]
     if given < _HARDLY:
         return [f"{camera.name}: {100 * given:.0f} % of its boxes fit a body on the ground: are columns and rig right?"]
     return []

@@ -3,8 +3,8 @@
 import os
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
-from unittest.mock import Mock
 
 import cv2
 import numpy as np
@@ -15,7 +15,8 @@ from run_files import write_small_run
 from stseg.commands.main import main
 from stseg.commands.terminal import standard_error
 from stseg.io.exports.archive import ARCHIVES
-from stseg.io.exports.formats import FORMATS, ExportFormat
+from stseg.io.exports.formats import FORMATS
+from stseg.io.runfile.reading.run_reader import Run
 
 COMMANDS = tables(Path(__file__).with_suffix(".toml"))["commands"]
 """Commands without their output, and their inputs."""
@@ -102,20 +103,29 @@ def test_an_export_is_replaced_by_its_like_alone(refusal: Command, to: str) -> N
 
 @pytest.mark.parametrize("to", [*FORMATS, *ARCHIVES])
 @pytest.mark.usefixtures("run_folder")
-def test_an_export_without_rows_is_not_published(refusal: Command, monkeypatch: pytest.MonkeyPatch, to: str) -> None:
+@pytest.mark.parametrize("lost", [120, 1 << 30])
+def test_an_export_that_lost_rows_is_not_published(
+    refusal: Command, monkeypatch: pytest.MonkeyPatch, to: str, lost: int
+) -> None:
     """As by a disk that is full and says nothing."""
+
+    def cut(path: Path | str) -> None:
+        Path(path).write_bytes(Path(path).read_bytes()[:-lost])
+
     if to in ARCHIVES:
-        monkeypatch.setattr("stseg.io.exports.archive._fill", lambda database, _: filled(database))
+        library, before = pytest.importorskip({"sqlite": "sqlite3"}.get(to, to)), iter((Path, cut))  # written, read
+        opened = library.connect
+        monkeypatch.setattr(library, "connect", lambda path, **keys: [next(before)(path), opened(path, **keys)][1])
     else:
-        monkeypatch.setitem(FORMATS, to, ExportFormat(Mock(), ""))
+        form = FORMATS[to]
+
+        def write(path: Path, run: Run) -> None:
+            form.write(path, run)
+            cut(path)
+
+        monkeypatch.setitem(FORMATS, to, replace(form, write=write))
     assert "out" in refusal("export", "run.h5", "--to", to, "-o", "out")
     assert not Path("out").exists()
-
-
-def filled(database: object) -> dict[str, int]:
-    """Tables that should hold a row."""
-    database.execute("CREATE TABLE recordings (recording TEXT)")  # type: ignore[attr-defined]
-    return {"recordings": 1}
 
 
 @pytest.mark.parametrize("words", ["evaluate tracks.csv tracks.csv", "inspect run.h5", "report run.h5 -o page.html"])
