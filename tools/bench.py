@@ -95,12 +95,10 @@ def costs(workload: Workload, sources: Sequence[Path], work: Path) -> Iterator[F
         write_scene(rig.parent, SceneFilm(workload.scene), overwrite=True)
     cpu_of_runs(sources, rig, output, workload.many or workload.few)  # compiles what is not in the cache
     while True:
-        few = cpu_of_runs(sources, rig, output, workload.few)
-        if workload.many is None:
-            yield 1000 * few
-        else:
-            many = cpu_of_runs(sources, rig, output, workload.many)
-            yield 1000 * (many - few) / (workload.many - workload.few)
+        cost = cpu_of_runs(sources, rig, output, workload.few)
+        if workload.many is not None:
+            cost = (cpu_of_runs(sources, rig, output, workload.many) - cost) / (workload.many - workload.few)
+        yield 1000 * cost
 
 
 def stored_commit(name: str) -> str:

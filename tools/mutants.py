@@ -6,11 +6,11 @@
 A mutant lacks one check: a condition that raises is never true, a call that requires or locks is left out, an escape
 returns its text, one part of a question `is_...` is always right, a flag of `open` is not given. In a copy below build/
 the tests run once while every check is watched, also in the processes that they start: a check that refuses something
-notes the test. Then the checks are broken, one after the other, and the tests of their notes run until one fails. Tests
-that fail under watch do not count. No process may have more than 6 GiB of data: some checks bound memory.
-With `--fuzz` all targets of fuzzing take the tests' place, for five minutes; then, for so many seconds, the target in
-which the broken check refused most often. Checks that refuse in none are not broken. A check makes no difference, and
-is no part of the share, where fuzzing without it fails nowhere and answers all files of its notes, ten or more, alike.
+notes the test. Then the checks are broken, one after the other, and the tests of their notes run until one fails, but
+for those that fail under watch. No process has more than 6 GiB of data: some checks bound memory.
+With `--fuzz` all targets of fuzzing take the tests' place for five minutes; then, for so many seconds, the target in
+which the broken check refused most often, if any. A check makes no difference, and is no part of the share, where
+fuzzing without it fails nowhere and answers all files of its notes, ten or more, alike.
 """
 
 import argparse
@@ -157,8 +157,8 @@ def main() -> None:
         tests[noted][test.partition("[")[0].partition(" ")[0]] += 1
     for name, text in texts.items():
         (COPY / name).write_text(text)
-    own = {name: text for name, text in texts.items() if name.startswith(given.only)}
-    every = [(name, k) for name, text in own.items() for k, _ in enumerate(checks(ast.parse(text)))]
+    own = [name for name in texts if name.startswith(given.only)]
+    every = [(name, k) for name in own for k, _ in enumerate(checks(ast.parse(texts[name])))]
     every = [one for one in every if not given.fuzz or f"{one[0]}#{one[1]}" in tests]
     chosen, verdicts = random.Random(given.every).sample(every, len(every) // given.every), Counter[str]()
     for name, number in sorted(chosen):

@@ -27,8 +27,7 @@ SIZE, FRAME_RATE = (160, 120), 5.0  # pixels; frames per second, not said either
 def read_rectangles(path: Path, camera: int) -> tuple[Floats, Floats]:
     """Where bodies stand, float64 (n, 2) metres, and their rectangles, float64 (n, 4): left, top, right, bottom."""
     words = (line.split() for line in path.read_text(encoding="ascii").splitlines())
-    rows = [w[2:] for w in words if w[:2] == ["RECTANGLE", str(camera)] and w[3] != "notvisible"]
-    table = np.array(rows, float)
+    table = np.array([w[2:] for w in words if w[:2] == ["RECTANGLE", str(camera)] and w[3] != "notvisible"], float)
     cell = table[:, 0].astype(int)
     # Rows count downwards: counted upwards, the cameras would see a mirrored room.
     return CELL * np.stack([cell % ROW, ROWS - 1 - cell // ROW], -1).astype(float), table[:, 1:]

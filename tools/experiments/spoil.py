@@ -70,9 +70,8 @@ def crowd(people: int, views: int, seconds: float, seed: int = NAMED["easy"].see
         NAMED["easy"], people=people, cameras=whole, seconds=seconds, frame_rate=10.0, size=(320, 240), seed=seed
     )
     film, frames, truth = SceneFilm(spec), [], [np.zeros(0, TRUTH)]
-    empty = np.zeros((0, 0, 3), np.uint8)
     for frame_set in film.frame_sets():
-        frames.append(tuple(replace(view, image=empty) for view in frame_set.views))
+        frames.append(tuple(replace(view, image=np.zeros((0, 0, 3), np.uint8)) for view in frame_set.views))
         truth.append(frame_set.truth)
     return Shown(film.rig, np.concatenate(truth), frames).seen_by(range(0, whole, whole // views))
 
