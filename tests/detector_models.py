@@ -4,6 +4,7 @@ Each stands for a layout. Its boxes are constant, one for each square of 8, 16 a
 as the square and as tall; its scores are the mean red and the mean blue of the square, less that of the other.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -95,10 +96,6 @@ def yolo8(path: Path, masks: int = 0, metadata: dict[str, str] | None = None) ->
     return graph.saved(path, outputs, metadata)
 
 
-def yolo8_segmentation(path: Path) -> Path:
-    return yolo8(path, masks=3)
-
-
 def yolo5(path: Path) -> Path:
     """Of three predictions a square, the second is the box, and the others have no objectness."""
     graph = Graph()
@@ -115,18 +112,10 @@ def one_prediction(path: Path, boxes: np.ndarray, objectness: float, red: int, l
     return graph.saved(path, {"o": (1, COUNT, 7)})
 
 
-def yolo6(path: Path) -> Path:
-    return one_prediction(path, CENTRES, 1.0, 0, 1.0)
-
-
 def yolox(path: Path) -> Path:
     """Offsets of half a square, and logarithms of sizes in sides."""
     raw = np.concatenate([np.full((COUNT, 2), 0.5), np.log(CENTRES[:, 2:] / SIDE)], axis=1)
     return one_prediction(path, raw, 0.9, 2, 255.0)
-
-
-def yolox_decoded(path: Path) -> Path:
-    return one_prediction(path, CENTRES, 0.9, 2, 255.0)
 
 
 def _best(graph: Graph) -> tuple[str, str]:
@@ -202,10 +191,10 @@ def unknown(path: Path) -> Path:
 
 
 MODELS = {
-    "YOLOv8 to YOLO11": (yolo8, yolo8_segmentation),
+    "YOLOv8 to YOLO11": (yolo8, partial(yolo8, masks=3)),
     "YOLOv5 or YOLOv7": (yolo5,),
-    "YOLOv6": (yolo6,),
-    "YOLOX": (yolox, yolox_decoded),
+    "YOLOv6": (partial(one_prediction, boxes=CENTRES, objectness=1.0, red=0, largest=1.0),),
+    "YOLOX": (yolox, partial(one_prediction, boxes=CENTRES, objectness=0.9, red=2, largest=255.0)),
     "YOLO with suppression inside": (suppressed, suppressed_batch),
     "RT-DETR with its choice inside": (lists,),
     "RT-DETR": (rtdetr, rtdetr_single),

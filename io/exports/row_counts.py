@@ -50,8 +50,8 @@ def _of_jupedsim(path: Path) -> int:
 
 def require_sound_pages(database: sqlite3.Connection) -> None:
     """Raise sqlite3.DatabaseError unless all pages of a database hold what their headers say."""
-    if said := [str(words) for (words,) in database.execute("PRAGMA quick_check") if words != "ok"]:
-        raise sqlite3.DatabaseError(said[0])
+    if problems := [str(words) for (words,) in database.execute("PRAGMA quick_check") if words != "ok"]:
+        raise sqlite3.DatabaseError(problems[0])
 
 
 def _of_movement(path: Path) -> int:

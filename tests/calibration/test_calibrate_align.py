@@ -71,7 +71,7 @@ def test_lengths_are_kept_where_asked(room: Path, kind: Literal["rigid", "simila
     assert again.scale == pytest.approx(found.scale) and max(point.off for point in again.points) < 1e-6
 
 
-def test_wrong_points_and_signs_are_named(room: Path) -> None:
+def test_wrong_points_signs_and_outputs_are_named(room: Path) -> None:
     placed = room.parent / "placed.toml"
     refused(CalibrationError, r"points.csv: y: found a mirrored ground", align_rig, room, points(room, (1, -1)), placed)
     refused(CalibrationError, r"line 2: found a pixel above", align_rig, room, points(room, ahead=False), placed)
@@ -85,11 +85,7 @@ def test_wrong_points_and_signs_are_named(room: Path) -> None:
     sizes = [camera.size for camera in rig.cameras]
     message = r"camera cam1: ground: found a mirrored ground .* change the sign of y"
     refused(CalibrationError, message, Rig.from_projections, downwards, sizes, rig.grid, 5.0)
-
-
-def test_an_aligned_rig_is_replaced_and_no_input(room: Path) -> None:
-    known, placed = points(room), room.parent / "placed.toml"
-    align_rig(room, known, placed)
+    align_rig(room, known := points(room), placed)
     refused(OutputError, r"placed.toml: found a file", align_rig, room, known, placed)
     align_rig(room, known, placed, overwrite=True)
     for read in (room, known):

@@ -235,6 +235,7 @@ class TestCommand:
 
     def test_points_make_a_rig(self, capsys: pytest.CaptureFixture[str]) -> None:
         table(Path("p.csv"))
+        refused(ConfigError, r"--lens: found 'lens.xml', expected a path with", run, "p.csv", "--lens=lens.xml")
         run("p.csv")
         cameras = read_recording("room.toml").rig.cameras
         assert [view.name for view in cameras] == ["a", "b", "c", "d"]
@@ -247,10 +248,6 @@ class TestCommand:
             calibrate_points, "p.csv", "q.toml", size=(640, 480), grid=Grid((-2, 2), (-2, 2)), frame_rate=8.0
         )
         refused(ConfigError, "sources: found a, expected one of camera b", make, sources=sources)
-
-    def test_a_lens_for_each_camera(self) -> None:
-        table(Path("p.csv"))
-        refused(ConfigError, r"--lens: found 'lens.xml', expected a path with", run, "p.csv", "--lens=lens.xml")
 
     def test_millimetres_are_named_and_taken(self) -> None:
         table(Path("p.csv"), lambda _, row: [*row[:2], *(1000 * cell for cell in row[2:])])

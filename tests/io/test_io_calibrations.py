@@ -280,17 +280,13 @@ class TestCommand:
         twice = read_opencv_xml([Path(files[0])]) * 2
         refused(ConfigError, "found 2 cameras in 1 files, not all with a name", _named, twice, files[:1], None)
 
-    def test_an_own_rig_is_replaced(self, calibrations: list[str]) -> None:
-        tokens = ("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml")
-        calibrate(*tokens)
-        calibrate(*tokens, "--overwrite")
-        assert len(read_recording("room.toml").rig.cameras) == 2
-
-    def test_options_may_stand_apart_from_their_values(self, calibrations: list[str]) -> None:
+    def test_an_own_rig_is_replaced_and_options_stand_apart(self, calibrations: list[str]) -> None:
+        calibrate("opencv", calibrations[0], *SCENE, *SOURCE, "-o=room.toml")
         apart = [word for option in (*SCENE, *SOURCE) for word in option.split("=")]
-        tokens = ["import", "opencv", *calibrations, *apart, "-o", "room.toml"]
+        tokens = ["import", "opencv", *calibrations, *apart, "-o", "room.toml", "--overwrite"]
         app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         assert read_recording("room.toml").rig.grid.x == (-1.0, 1.0)
+        assert len(read_recording("room.toml").rig.cameras) == 2
 
     @cases()
     def test_says_what_to_mend(self, calibrations: list[str], tokens: str, kind: str, complaint: str) -> None:

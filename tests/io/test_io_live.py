@@ -128,7 +128,7 @@ def test_reading_waits_for_who_takes_frames(arriving: Path, tmp_path: Path, monk
     assert count == FRAMES
 
 
-def test_a_file_that_was_not_complete_is_told(tmp_path: Path) -> None:
+def test_broken_videos_and_those_not_complete_are_told(tmp_path: Path) -> None:
     rig = write_pieces(tmp_path, empty=True)
     arrive(tmp_path, 1)
     content = (tmp_path / "pieces" / "east_1.avi").read_bytes()
@@ -138,14 +138,9 @@ def test_a_file_that_was_not_complete_is_told(tmp_path: Path) -> None:
         next(frame_sets)
         arrive(tmp_path, 1, 2)
         refused(SourceError, said, lambda: list(frame_sets))
-
-
-def test_a_broken_video_among_those_that_arrive_is_told(tmp_path: Path) -> None:
-    rig = write_pieces(tmp_path, empty=True)
-    arrive(tmp_path, 1)
     (tmp_path / "in" / "east_1.avi").write_bytes(b"no video")
     write_at_rate(tmp_path / "in" / "east_2.avi", numbered(0, 2))
-    with followed(rig, tmp_path) as frame_sets:
+    with followed(rig, tmp_path / "in") as frame_sets:
         refused(SourceError, r"east_1\.avi: ", next, frame_sets)
 
 

@@ -335,13 +335,10 @@ def test_a_film_of_a_scene_that_cannot_be_written(
     refused(OutputError, message, lambda: simulated_scene._Video(tmp_path / "a.avi", camera, 5.0, None).close())
 
 
-def test_names_are_archived_without_escape_codes(run_path: Path) -> None:
+def test_archives_have_no_escape_codes_and_tables_that_fit(run_path: Path) -> None:
     (path := run_path.with_name("q")).touch()
-    ARCHIVES["sqlite"](path, [read_run(run_path.rename(run_path.with_name("\x1b[31m.h5")))])
+    run = read_run(run_path.rename(run_path.with_name("\x1b[31m.h5")))
+    ARCHIVES["sqlite"](path, [run])
     assert b"\x1b[" not in path.read_bytes() and rb"\x1b[31m.h5" in path.read_bytes()
-
-
-def test_tables_that_do_not_fit_are_not_archived(run_path: Path) -> None:
-    run = read_run(run_path)
     run.tracks["first"] = 0
-    refused(FormatError, "/tracks: found other frames", ARCHIVES["sqlite"], run_path.with_name("q"), [run])
+    refused(FormatError, "/tracks: found other frames", ARCHIVES["sqlite"], path, [run])

@@ -31,7 +31,7 @@ def picture(size: tuple[int, int], *rectangles: tuple[tuple[int, int, int, int],
 
 
 @pytest.mark.parametrize("by_opencv", [True, False], ids=["opencv", "onnxruntime"])
-@pytest.mark.parametrize(("name", "build"), CASES, ids=[build.__name__ for _, build in CASES])
+@pytest.mark.parametrize(("name", "build"), CASES)
 def test_people_of_every_layout_in_camera_pixels(name: str, build, by_opencv: bool, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     if not by_opencv:
         pytest.importorskip("onnxruntime")
@@ -51,9 +51,7 @@ def test_people_of_every_layout_in_camera_pixels(name: str, build, by_opencv: bo
     assert [8, 96, 16, 32] in other.pixel.round(3).tolist()
 
 
-@pytest.mark.parametrize(
-    "build", [build for name, build in CASES if "RT-DETR" not in name], ids=lambda build: build.__name__
-)
+@pytest.mark.parametrize("build", [build for name, build in CASES if "RT-DETR" not in name])
 @pytest.mark.parametrize("size", [(64, 64), (192, 64), (61, 203)])
 def test_boxes_of_letter_boxed_pictures(build, size: tuple[int, int], tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     detector = OnnxDetector(build(tmp_path / "model.onnx"), least_score=0.5)
