@@ -156,7 +156,7 @@ def sampled_checksum(source: Source) -> str:
         for path in files[:: max(1, len(files) // _SAMPLED_FILES)]:
             with path.open("rb") as file:
                 size = file.seek(0, os.SEEK_END)
-                for place in (0, size // 2, max(0, size - _SAMPLE)):
+                for place in (0, max(0, (size - _SAMPLE) // 2), max(0, size - _SAMPLE)):
                     file.seek(place)
                     digest.update(file.read(_SAMPLE))
     except (OSError, SourceError):

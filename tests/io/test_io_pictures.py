@@ -233,6 +233,8 @@ def test_reduced_pictures_are_the_means_of_squares_nearly(tmp_path: Path, factor
     whole = stream.read()
     with patch.object(stream, "_capture", Mock(retrieve=lambda: (False, None))):
         refused(SourceError, "frame 1: found a broken frame", stream.read)
+    with patch.object(VideoStream, "_grab", Mock(return_value=False)):
+        refused(SourceError, "no frame that decodes", VideoStream(Source("video", path), camera).read)
     assert reduced is not None and whole is not None
     assert reduced.shape == (50 // factor, 66 // factor, 3)
     difference = reduced.astype(float) - reduced_picture(whole, factor)
@@ -255,6 +257,9 @@ def test_a_damaged_picture_leaves_the_reduced_frames(tmp_path: Path, film: bytes
 def test_frames_are_found_by_seeking_packets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, frame: int) -> None:
     path = video(tmp_path / "film.avi", "MJPG")
     monkeypatch.setattr(video_stream, "_SEQUENTIAL_FRAMES", 1)
-    one, other = (VideoStream(Source("video", path), CAMERA, times, factor=2) for times in (None, decoded(path)))
-    assert one.skip(frame) == other.skip(frame) == frame
-    np.testing.assert_array_equal(one.read(), other.read())
+    monkeypatch.setattr(video_stream, "lost_frames", Mock(side_effect=[None, np.zeros(0, int)]))
+    moments = (None, decoded(path), decoded(path))
+    one, lost, other = (VideoStream(Source("video", path), CAMERA, times, factor=2) for times in moments)
+    assert one.skip(frame) == lost.skip(frame) == other.skip(frame) == frame
+    np.testing.assert_array_equal(one.read(), shown := other.read())
+    np.testing.assert_array_equal(lost.read(), shown)
