@@ -10,12 +10,13 @@ import cv2
 import numpy as np
 import pytest
 from checks import Command, tables
-from run_files import write_small_run
+from run_files import small_recording, write_small_run
 
 from stseg.commands.main import main
 from stseg.commands.terminal import standard_error
 from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS
+from stseg.io.recording.rig_text import format_rig
 from stseg.io.runfile.reading.run_reader import Run
 
 COMMANDS = tables(Path(__file__).with_suffix(".toml"))["commands"]
@@ -83,11 +84,12 @@ def test_pictures_and_tables_replace_nothing_foreign(folder: Path, refusal: Comm
     for command in (
         "inspect rig.toml -o .",
         "measure run.h5 -o .",
-        "run rig.toml -o new.h5 --labels .",
         "report run.h5 -o page.html --pictures .",
         "calibrate check rig.toml --frames 0:2 --pictures west.png",
     ):
         refusal(*command.split(), "--overwrite")
+    Path("small.toml").write_text(format_rig(small_recording(folder), folder / "small.toml"))
+    assert ".: found files in it" in refusal(*["run", "small.toml", "-o", "new.h5", "--labels", "."])
     assert before.items() <= contents(folder).items() and not Path("new.h5").exists()
 
 

@@ -228,6 +228,7 @@ def test_a_resumed_run_is_the_run_or_is_refused(
         patch.setattr(sys, "stderr", printed)
         if track(folder / "rig.toml", folder / "run.h5", *more):
             assert printed.getvalue().count("\n") == 1, printed.getvalue()
+            assert not re.search(r"found (.*), where .* has \1, expected", printed.getvalue()), printed.getvalue()
             assert len(segments_of(folder / "run.h5")) == len(segments_of(killed))
         else:
             assert track(folder / "rig.toml", folder / "undisturbed.h5", *more) == 0

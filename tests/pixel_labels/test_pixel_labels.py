@@ -223,8 +223,7 @@ def density(colour: Floats, t: int, s: int, worn: ViewAppearance) -> float:
 
 @drawn(20, st.integers(0, 2**32 - 1))
 def test_ratios_are_those_of_the_definition(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    likelihood, rows, image = two_rectangles(rng)
+    likelihood, rows, image = two_rectangles(np.random.default_rng(seed))
     sums = ColourSums.of(TRACKS)
     sums.add(likelihood, rows, TRACKS, image)
     worn = sums.appearance()
@@ -241,8 +240,7 @@ def test_ratios_are_those_of_the_definition(seed: int) -> None:
 
 
 def test_colours_are_learned_from_certain_pixels() -> None:
-    rng = np.random.default_rng(2)
-    likelihood, rows, image = two_rectangles(rng)
+    likelihood, rows, image = two_rectangles(np.random.default_rng(2))
     sure = likelihood.people.share >= 0.9
     sums = ColourSums.of(TRACKS)
     for _ in range(2000):

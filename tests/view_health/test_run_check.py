@@ -95,8 +95,7 @@ def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureF
 
 def correlated(frames: int, views: int, seed: int, correlation: float = 0.6) -> Floats:
     """Noise of standard deviation 1 whose neighbours are alike."""
-    lots = np.random.default_rng(seed)
-    noise = lots.normal(size=(frames, views))
+    noise = np.random.default_rng(seed).normal(size=(frames, views))
     for k in range(1, frames):
         noise[k] = correlation * noise[k - 1] + np.sqrt(1 - correlation**2) * noise[k]
     return noise

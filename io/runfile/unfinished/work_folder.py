@@ -286,16 +286,15 @@ class Difference(NamedTuple):
 
 
 def differences(now: dict[str, Any], begun: dict[str, Any], prefix: str = "") -> list[Difference]:
-    """All differences of two nested tables."""
+    """All differences of two nested tables; lists are tables of their places."""
     found = []
-    for key in (*now, *(key for key in begun if key not in now)):
+    for key in now | begun:
         a, b, name = now.get(key, "nothing"), begun.get(key, "nothing"), f"{prefix}{key}"
+        if isinstance(a, list) and isinstance(b, list):
+            a, b = ({str(place): value for place, value in enumerate(one)} for one in (a, b))
         if isinstance(a, dict) and isinstance(b, dict):
             found += differences(a, b, f"{name}.")
         elif a != b:
-            found.append(Difference(name, _value(a), _value(b)))
+            words = (one[: limits.NAME] if isinstance(one, str) else abbreviated(one) for one in (a, b))
+            found.append(Difference(name, *words))
     return found
-
-
-def _value(value: object) -> str:
-    return value[: limits.NAME] if isinstance(value, str) else abbreviated(value)
