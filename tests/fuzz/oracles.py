@@ -194,6 +194,7 @@ def require_run(run: Run) -> None:
         assert (file.attrs["format"], file.attrs["format_version"]) == (layout.FORMAT, layout.VERSION)
     assert (np.diff(run.frames) > 0).all() and len(np.unique(rows[["frame", "id"]])) == len(rows)
     assert np.isin(rows["frame"], run.frames).all() and np.isfinite(rows["height"]).all()
+    assert not any((np.isinf(rows[name]) | (rows[name] < 0)).any() for name in ("height", "width", "xx", "yy"))
     assert len(run.cameras) == len(set(run.cameras)) and all(map(is_name, run.cameras))
     known = dict(zip(*np.unique(rows["id"], return_counts=True), strict=True))
     assert all(one["first"] <= one["last"] for one in run.tracks) and set(run.tracks["id"].tolist()) == set(known)

@@ -55,8 +55,7 @@ def run(tracker: str, first: int, stop: int, rest: bool = True) -> list[Commit]:
 @pytest.mark.parametrize("first", [0, 5])
 def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) -> None:
     commits = run(tracker, first, first + frames)
-    committed = [s.frame for commit in commits for s in commit.frames]
-    assert committed == list(range(first, first + frames))
+    assert [s.frame for commit in commits for s in commit.frames] == [*range(first, first + frames)]
     for commit in commits:
         assert commit.label.shape == (len(commit.frames), *RIG.grid.shape) and commit.label.dtype == np.int32
         assert set(commit.trajectory["frame"]) <= {s.frame for s in commit.frames}
