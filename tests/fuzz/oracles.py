@@ -198,7 +198,7 @@ def require_run(run: Run) -> None:
     assert len(run.cameras) == len(set(run.cameras)) and all(map(is_name, run.cameras))
     known = dict(zip(*np.unique(rows["id"], return_counts=True), strict=True))
     assert all(one["first"] <= one["last"] for one in run.tracks) and set(run.tracks["id"].tolist()) == set(known)
-    require_numbers(limits.METRES, rows["x"], rows["y"])
+    require_numbers(limits.METRES, rows["x"], rows["y"], run.heights, run.ground_x, run.ground_y)
     assert all(map(is_title, run.names.values()))
 
 
