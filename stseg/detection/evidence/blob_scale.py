@@ -28,7 +28,7 @@ def blob_scales(
     """
     scale, owner, middle = np.zeros(rasters.shape, np.float32), lattice.owner.reshape(-1), len(body.heights) // 2
     pixels = UnexplainedPixels.of(rasters, owner, lattice, extremes)
-    score = np.full((len(body.heights), lattice.boxes.shape[1]), config.prior_log_odds)
+    score = np.full((len(body.heights), lattice.cells.box.shape[1]), config.prior_log_odds)
     fill_scores(pixels, lattice, np.array([middle]), np.zeros(0, np.int64), 0.0, config.effective_observations, score)
     certain = float(np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate))
     _fill_scales(pixels, lattice, np.flatnonzero(score[middle] > 0), middle, len(score), certain, scale)
@@ -49,7 +49,7 @@ def _fill_scales(
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
     for view in range(len(every_pillar.shapes)):
         for cell in cells:
-            i = (view * heights + height) * every_pillar.boxes.shape[1] + cell
+            i = (view * heights + height) * every_pillar.cells.box.shape[1] + cell
             mean = pillar_evidence(view, cell, i, pixels, lattice, 1.0)
             _raise_inside(view, i, np.float32(lattice.outlines.area[i] * mean / certain), lattice, scale)
 

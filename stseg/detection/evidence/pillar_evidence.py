@@ -8,7 +8,7 @@ else, the sum is the number of pixels times the lowest.
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.detection.evidence.pixel_lattice import STRIP_CELLS, PixelLattice
+from stseg.detection.evidence.pixel_lattice import STRIP_CELLS, PillarBoxes, PixelLattice
 from stseg.detection.evidence.unexplained_pixels import QUANTA_PER_NAT, UnexplainedPixels, more_inside, sum_to, unsigned
 from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.pointed_tuples import pointed
@@ -32,36 +32,52 @@ def fill_scores(
     evaluating the `others`; so are other heights that score 0 or less, and cells where all heights do by all that
     pixels may add.
     """
-    bound = np.zeros(lattice.pixel_share.shape)
-    _fill_bounds(pixels, lattice, weight, bound)
-    added = bound.sum(0)
-    score[:, score.max(0) + added + _ROUNDING_MARGIN <= 0] = -np.inf
-    _add_evidence(pixels, lattice, probes, minimum_probe_score, weight, bound, added, score)
-    score[np.ix_(others, (score[probes] <= minimum_probe_score).all(0))] = -np.inf
-    _add_evidence(pixels, lattice, others, 0.0, weight, bound, added, score)
+    best, strips = score.max(0) + _ROUNDING_MARGIN, np.arange(lattice.strips.box.shape[1])
+    in_strips = _bounds(pixels, lattice.strips, strips, weight).sum(0).repeat(STRIP_CELLS)
+    cells = np.flatnonzero(best + in_strips[: len(best)] > 0)
+    bound = _bounds(pixels, lattice.cells, cells, weight)
+    matters = best[cells] + bound.sum(0) > 0
+    cells, bound = cells[matters], bound[:, matters]
+    open_score, added = score[:, cells], bound.sum(0)
+    _add_evidence(pixels, lattice, cells, probes, minimum_probe_score, weight, bound, added, open_score)
+    open_score[np.ix_(others, (open_score[probes] <= minimum_probe_score).all(0))] = -np.inf
+    _add_evidence(pixels, lattice, cells, others, 0.0, weight, bound, added, open_score)
+    score[:] = -np.inf
+    score[:, cells] = open_score
+
+
+def _bounds(pixels: UnexplainedPixels, pillars: PillarBoxes, chosen: Ints, weight: float) -> Floats:
+    """The most that each view adds to the score of any pillar of the chosen cells or strips (k,), (view, k), nats."""
+    bound = np.zeros((len(pillars.box), len(chosen)))
+    _fill_bounds(pixels, pillars, chosen, weight, bound)
+    return bound
 
 
 @kernel
-def _fill_bounds(every_pixel: UnexplainedPixels, every_pillar: PixelLattice, weight: float, bound: Floats) -> None:
-    """Fill bound (view, cell), 0 before, with the most that a view adds to the score of any pillar of a cell, nats.
+def _fill_bounds(
+    every_pixel: UnexplainedPixels, every_pillar: PillarBoxes, chosen: Ints, weight: float, bound: Floats
+) -> None:
+    """Fill bound (view, k), 0 before; see `_bounds`.
 
-    That is at most the log-odds above 0 around the cell that no member explains, and at most the lowest log-odds of all
-    that lies on the raster, with the excess.
+    That is at most the log-odds above 0 around the pillars that no member explains, and at most the lowest log-odds of
+    all that lies on the raster, with the excess.
     """
-    pixels, lattice = pointed(every_pixel), pointed(every_pillar)
+    pixels, pillars = pointed(every_pixel), pointed(every_pillar)
     for view in range(len(bound)):  # cells of one view after the other lie side by side in memory
-        boxes, lowest = lattice.boxes[view], pixels.extremes[view, 0]
-        for cell in range(bound.shape[1]):
-            if boxes[cell, 2] > 0:
-                share = lattice.pixel_share[view, cell] * (1 / QUANTA_PER_NAT)
-                more = lattice.inside_share[view, cell] * lowest + more_inside(view, cell, boxes, pixels.above) * share
-                bound[view, cell] = weight * min(more, more_inside(view, cell, boxes, pixels.gain_above) * share)
+        boxes, lowest = pillars.box[view], pixels.extremes[view, 0]
+        for k, one in enumerate(chosen):
+            if boxes[one, 2] > 0:
+                inside = pillars.inside_share[view, one] if lowest < 0 else 1.0
+                share = pillars.pixel_share[view, one] * (1 / QUANTA_PER_NAT)
+                more = inside * lowest + more_inside(view, one, boxes, pixels.above) * share
+                bound[view, k] = weight * min(more, more_inside(view, one, boxes, pixels.gain_above) * share)
 
 
 @kernel
 def _add_evidence(
     every_pixel: UnexplainedPixels,
     every_pillar: PixelLattice,
+    cells: Ints,
     heights: Ints,
     least: float,
     weight: float,
@@ -69,26 +85,25 @@ def _add_evidence(
     added: Floats,
     score: Floats,
 ) -> None:
-    """Add the evidence of all views to the score (height, cell) of some heights; -inf where it is not above the least.
+    """Add the evidence of all views to the score (height, k) of some heights; -inf where it is not above the least.
 
-    Views, each of which adds at most `bound` (view, cell), all together `added` (cell,), follow each other: pillars
-    that the next ones cannot raise above the least are dropped.
+    Views, each of which adds at most `bound` (view, k) in the cells (k,), all together `added` (k,), follow each other:
+    pillars that the next ones cannot raise above the least are dropped.
     """
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
-    views, cells = bound.shape
     most = score + added
-    for view in range(views):
+    for view in range(len(bound)):
         for height in heights:
-            for cell in range(cells):
-                if most[height, cell] + _ROUNDING_MARGIN > least:
-                    i = (view * len(score) + height) * cells + cell
+            for k, cell in enumerate(cells):
+                if most[height, k] + _ROUNDING_MARGIN > least:
+                    i = (view * len(score) + height) * every_pillar.cells.box.shape[1] + cell
                     evidence = pillar_evidence(view, cell, i, pixels, lattice, weight)
-                    most[height, cell] += evidence - bound[view, cell]
-                    score[height, cell] += evidence
+                    most[height, k] += evidence - bound[view, k]
+                    score[height, k] += evidence
     for height in heights:
-        for cell in range(cells):
-            if most[height, cell] + _ROUNDING_MARGIN <= least:
-                score[height, cell] = -np.inf
+        for k in range(len(cells)):
+            if most[height, k] + _ROUNDING_MARGIN <= least:
+                score[height, k] = -np.inf
 
 
 @part

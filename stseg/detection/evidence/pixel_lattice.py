@@ -18,19 +18,24 @@ _PILLARS_AT_ONCE = 4096
 """Pillars of the lattice that are drawn at once: until they are packed, each takes as many rows as the tallest."""
 
 
+class PillarBoxes(NamedTuple):
+    """What bounds the outlines of all heights, in the cells of the lattice or in its strips (n,)."""
+
+    box: Shorts
+    """int16 (view, n, 4): left, top, right, bottom of the box around them, raster pixels; right 0 where there is none."""
+    inside_share: Floats
+    """float64 (view, n): the least share of an outline that lies on the raster."""
+    pixel_share: Floats
+    """float64 (view, n): the greatest share of one pixel in an outline; 0 where the view sees none."""
+
+
 class PixelLattice(NamedTuple):
     """Pillars of the birth lattice in all views of a rig that deliver pixels."""
 
     outlines: PackedOutlines
     """The pillars (view * height * cell,): most are asked for at one height; areas are fair ones."""
-    boxes: Shorts
-    """int16 (view, cell, 4): left, top, right, bottom of the box around the outlines of all heights, raster pixels."""
-    strips: Shorts
-    """int16 (view, strip, 4): the same around the outlines of a strip's cells."""
-    inside_share: Floats
-    """float64 (view, cell): the least share of a height's outline that lies on the raster."""
-    pixel_share: Floats
-    """float64 (view, cell): the greatest share of one pixel in a height's outline; 0 where the view sees none."""
+    cells: PillarBoxes
+    strips: PillarBoxes
     shapes: Ints
     """int64 (view, 2): rows and columns of the rasters."""
     owner: Shorts
@@ -57,20 +62,12 @@ class PixelLattice(NamedTuple):
         owner = np.full((len(chosen), rows * columns), -1, np.int16)
         left_of = np.empty((len(chosen), rows, columns + 1))
         per_cell = (len(chosen), len(body.heights), len(lattice_ground))
-        pixel_share = np.where(outlines.inside > 0, 1 / np.maximum(outlines.area, 1), 0.0)
-        inside_share = (outlines.inside * pixel_share).reshape(per_cell).min(1)
-        return cls(
-            outlines,
-            boxes,
-            strips,
-            inside_share,
-            pixel_share.reshape(per_cell).max(1),
-            shapes,
-            owner,
-            above,
-            gain_above,
-            left_of,
-        )
+        share = np.where(outlines.inside > 0, 1 / np.maximum(outlines.area, 1), 0.0)
+        inside_share, pixel_share = (outlines.inside * share).reshape(per_cell).min(1), share.reshape(per_cell).max(1)
+        first = np.arange(0, len(lattice_ground), STRIP_CELLS)
+        in_strips = np.minimum.reduceat(inside_share, first, 1), np.maximum.reduceat(pixel_share, first, 1)
+        cells = PillarBoxes(boxes, inside_share, pixel_share)
+        return cls(outlines, cells, PillarBoxes(strips, *in_strips), shapes, owner, above, gain_above, left_of)
 
 
 def _drawn(

@@ -40,15 +40,13 @@ class UnexplainedPixels(NamedTuple):
     """int32 (view, v + 1, u + 1): sums like `above` of the log-odds above 0 of pixels that no member explains."""
     is_shown: Flags
     """bool (view, strip): whether the box of a strip has any excess."""
-    is_open: Flags
-    """bool (view, strip): whether the box of a strip has a pixel with log-odds above 0 that no member explains."""
     extremes: Floats
     """float64 (view, 2): the lowest and the highest log-odds, nats."""
 
     @classmethod
     def of(cls, rasters: Singles, owners: Shorts, lattice: PixelLattice, extremes: Floats) -> Self:
         """From the log-odds of all pixels, float32 (view, v, u), and the members who explain them, int16 (pixel,)."""
-        number, (is_shown, is_open) = lattice.shapes.prod(1), np.empty((2, *lattice.strips.shape[:2]), bool)
+        number, is_shown = lattice.shapes.prod(1), np.empty(lattice.strips.box.shape[:2], bool)
         summed_to = np.zeros(rasters.shape[:2], np.uint64)
         pixels = cls(
             rasters,
@@ -59,10 +57,9 @@ class UnexplainedPixels(NamedTuple):
             lattice.above,
             lattice.gain_above,
             is_shown,
-            is_open,
             extremes,
         )
-        _fill_above(pixels, lattice.shapes, lattice.strips)
+        _fill_above(pixels, lattice.shapes, lattice.strips.box)
         return pixels
 
 
@@ -87,7 +84,6 @@ def _fill_above(pixels: UnexplainedPixels, shapes: Ints, strips: Shorts) -> None
         for k in range(strips.shape[1]):
             is_seen = strips[view, k, 2] > 0
             pixels.is_shown[view, k] = is_seen and more_inside(view, k, strips[view], pixels.above) > 0
-            pixels.is_open[view, k] = is_seen and more_inside(view, k, strips[view], pixels.gain_above) > 0
 
 
 @part
