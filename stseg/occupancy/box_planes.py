@@ -17,10 +17,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.bodies.box_fit import half_square
 from stseg.bodies.pillar_index import PillarIndex, ViewBoxes, fill_fits
-from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.kernels.accelerate import kernel, part
 from stseg.occupancy.fusion import ErrorRates
@@ -132,11 +131,12 @@ def fill_levels(
     heights: Floats,
     planes: Floats,
     cells: ShownCells,
-    footprint: Footprints,
+    marked: Flags,
+    places: Labels,
     rates: ErrorRates,
     levels: Levels,
 ) -> None:
-    """Fill levels (n,) with L of each cell, UNSEEN where the view does not see it.
+    """Fill levels (n,) with L of each cell that the view sees in the marked blocks; UNSEEN elsewhere before, or empty.
 
     Parameters
     ----------
@@ -144,23 +144,29 @@ def fill_levels(
         From `fill_fit`.
     heights : float64 (height,), planes : float64 (plane,)
         Metres, rising.
-    footprint : int16 (cell, 4)
-        In block order; see `stseg.geometry.sampling`.
+    marked : bool (block of one plane,)
+        Those with a cell that a box might show, or near a person.
+    places : int32 (cell,)
+        In block order; see `CellTables`.
     """
-    ground_cells, first_taller = len(fit.found), np.searchsorted(heights, planes)
-    unfit = level_of_match(0.0, rates.miss, rates.clutter), level_of_match(0.0, rates.miss, rates.near_clutter)
-    for k in range(len(cells.cell)):
-        cell, place, is_near = np.uint64(cells.cell[k]), np.uint64(cells.place[k]), cells.near_person[k] >= 0
-        best = -np.inf
-        if fit.found[place]:
-            for h in range(first_taller[np.uint64(cells.in_volume[k]) // np.uint64(ground_cells)], len(heights)):
-                best = max(best, float(fit.best[h, place]))
-        if footprint[cell, 2] == 0:
-            levels[k] = UNSEEN
-        elif best > -np.inf:
-            levels[k] = level_of_match(np.exp(best), rates.miss, rates.near_clutter if is_near else rates.clutter)
-        else:
-            levels[k] = unfit[1] if is_near else unfit[0]
+    first_taller = np.searchsorted(heights, planes)
+    unfit = level_of_match(0.0, rates.miss, rates.near_clutter)
+    for b in range(len(cells.block)):
+        plane, column = divmod(cells.block[b], len(marked))
+        if not marked[column]:
+            continue
+        shift, first_height = cells.first[b] - cells.start[b], first_taller[plane]
+        for k in range(cells.start[b], cells.start[b + 1]):
+            place, is_near, best = places[k + shift], cells.near_person[k] >= 0, -np.inf
+            if levels[k] == UNSEEN:
+                continue
+            if fit.found[place]:
+                for h in range(first_height, len(heights)):
+                    best = max(best, float(fit.best[h, place]))
+            if best > -np.inf:
+                levels[k] = level_of_match(np.exp(best), rates.miss, rates.near_clutter if is_near else rates.clutter)
+            elif is_near:
+                levels[k] = unfit
 
 
 @kernel

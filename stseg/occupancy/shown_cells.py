@@ -62,45 +62,37 @@ class ShownCells(NamedTuple):
 
     Attributes
     ----------
-    cell : int32 (n,)
-        Index in block order, of those that a view sees.
-    place : int32 (n,)
-        Index in block order, of all ground cells.
-    in_volume : int32 (n,)
-        Index in the flattened volume.
     block : int32 (b,)
         The blocks that have any, as indices among those of all planes.
     start : int32 (b + 1,)
-        First cell of each block, and n behind the last one.
-    unseen : int16 (view, n + k)
-        UNSEEN where the view does not see it, else 0.
+        First cell of each block among these, and n behind the last one.
+    first : int32 (b,)
+        First cell of each block in block order, among all cells that a view sees.
+    in_volume : int32 (n,)
+        Index in the flattened volume.
+    others : float64 (k,)
+        Cells that each representative stands for.
     near_person : int32 (n + k,)
         The person near each, -1 for none.
-    number : float64 (n + k,)
-        Cells that each stands for where some are counted for all: 0 for those that are left out.
     """
 
-    cell: Labels
-    place: Labels
-    in_volume: Labels
     block: Labels
     start: Labels
-    unseen: Levels
+    first: Labels
+    in_volume: Labels
+    others: Floats
     near_person: Labels
-    number: Floats
 
+    def numbers(self) -> Floats:
+        """Cells that each stands for where some are counted for all, 0 for those left out: float64 (n + k,).
 
-class _MarkedCells(NamedTuple):
-    """The marked blocks, and what they make of `ShownCells`."""
-
-    marked: Flags
-    cell: Labels
-    place: Labels
-    in_volume: Labels
-    block: Labels
-    start: Labels
-    unseen: Levels
-    number: Floats
+        Cells of a block show nearly the same pixels.
+        """
+        count, side = len(self.in_volume), BLOCK_SIDE**2
+        stride = 1 + count // _MOST_COUNTED
+        number = np.zeros((1 + count // (stride * side), stride, side))
+        number[:, 0] = stride
+        return np.append(number.reshape(-1)[:count], self.others)
 
 
 class CellTables:
@@ -136,7 +128,7 @@ class CellTables:
         self.footprint, self.place = views.take(self.in_volume, 1), place.astype(np.int32)
         self._width = np.add.reduceat(is_seen, start, dtype=np.int64)  # cells of each block
         self._first = (self._width.cumsum() - self._width).astype(np.int32)
-        self._cells: _MarkedCells | None = None
+        self._marked, self._cells = self.nothing_marked(), self._cells_of(self.nothing_marked())
 
     @cached_property
     def sets(self) -> ViewSets:
@@ -148,6 +140,12 @@ class CellTables:
             code += code + (boxes[:, 2] > 0)
         _, example, of_cell, size = np.unique(code, return_index=True, return_inverse=True, return_counts=True)
         return ViewSets(of_cell.astype(np.int32), (self.footprint[:, example, 2] > 0).T.copy(), size.astype(np.int64))
+
+    @cached_property
+    def unseen(self) -> Levels:
+        """UNSEEN where a view does not see a cell, else 0, then the same of each set: int16 (view, cell + set)."""
+        is_seen = np.concatenate([self.footprint[..., 2] > 0, self.sets.seen_by.T], 1)
+        return np.where(is_seen, np.int16(0), np.int16(UNSEEN))
 
     @cached_property
     def set_of_cell(self) -> Labels:
@@ -172,32 +170,40 @@ class CellTables:
         """
         if marked.mean() > _NEARLY_ALL:
             marked = np.ones_like(marked)
-        if self._cells is None or not np.array_equal(marked, self._cells.marked):
-            self._cells = self._cells_of(marked)
-        _, cell, place, in_volume, block, start, unseen, number = self._cells
-        person = np.full(len(number), -1, np.int32)
-        np.take(near_person.astype(np.int32), place, out=person[: len(place)], mode="clip")  # no copy of `out`
-        return ShownCells(cell, place, in_volume, block, start, unseen, person, number)
+        if not np.array_equal(marked, self._marked):
+            self._marked, self._cells = marked.copy(), self._cells_of(marked)
+        _fill_near(self._cells, self.place, near_person)
+        return self._cells
 
-    def _cells_of(self, marked: Flags) -> _MarkedCells:
+    def _cells_of(self, marked: Flags) -> ShownCells:
+        """The cells of the marked blocks, those near a person not known yet."""
         block = np.flatnonzero(marked & (self._width > 0)).astype(np.int32)
         start = np.append(0, self._width[block].cumsum()).astype(np.int32)
-        before = self._first[block] - start[:-1]
-        cell = np.arange(start[-1], dtype=np.int32) + np.repeat(before, self._width[block])
-        sets, of_cell = self.sets, self.sets.of_cell[cell]
-        others = sets.size - np.bincount(of_cell, minlength=len(sets.size))
-        of_sets = np.where(sets.seen_by.T, np.int16(0), np.int16(UNSEEN))
-        unseen = np.concatenate([of_sets.take(of_cell, 1), of_sets], 1)
-        number = np.concatenate([_cell_numbers(len(cell)), others])
-        return _MarkedCells(marked.copy(), cell, self.place[cell], self.in_volume[cell], block, start, unseen, number)
+        in_volume, others = np.empty(start[-1], np.int32), self.sets.size.astype(float)
+        near_person = np.full(len(in_volume) + len(others), -1, np.int32)
+        cells = ShownCells(block, start, self._first[block], in_volume, others, near_person)
+        _fill_cells(cells, self.in_volume, self.sets.of_cell)
+        return cells
 
 
-def _cell_numbers(count: int) -> Floats:
-    """Number of cells that each of `count` stands for; those of a block show nearly the same pixels."""
-    stride, side = 1 + count // _MOST_COUNTED, BLOCK_SIDE**2
-    number = np.zeros((1 + count // (stride * side), stride, side))
-    number[:, 0] = stride
-    return number.reshape(-1)[:count]
+@kernel
+def _fill_cells(cells: ShownCells, in_volume: Labels, of_cell: Labels) -> None:
+    """Fill the indices in the volume, from those (cell,) of all, and take what is listed off the numbers of others."""
+    for b in range(len(cells.block)):
+        shift = cells.first[b] - cells.start[b]
+        for k in range(cells.start[b], cells.start[b + 1]):
+            cells.in_volume[k] = in_volume[k + shift]
+        for k in range(cells.start[b], cells.start[b + 1]):
+            cells.others[of_cell[k + shift]] -= 1
+
+
+@kernel
+def _fill_near(cells: ShownCells, place: Labels, near_person: Ints) -> None:
+    """Fill the person near each cell listed, from that near each place (place,)."""
+    for b in range(len(cells.block)):
+        shift = cells.first[b] - cells.start[b]
+        for k in range(cells.start[b], cells.start[b + 1]):
+            cells.near_person[k] = near_person[place[k + shift]]
 
 
 @kernel

@@ -117,9 +117,23 @@ def mark_people(reach: Reach, assigned: PixelAssignment, marked: Flags) -> None:
 
 
 @kernel
+def fill_empty(cells: ShownCells, unseen: Levels, empty: int, levels: Levels, share: Singles) -> None:
+    """Fill levels and share (n + k,) of a view as if it showed nothing; see `CellTables.unseen`."""
+    level, after = np.int16(empty), cells.start[-1]  # all bits of UNSEEN are set
+    for b in range(len(cells.block)):
+        shift = cells.first[b] - cells.start[b]
+        for k in range(cells.start[b], cells.start[b + 1]):
+            levels[k] = unseen[k + shift] | level
+    for k in range(after, len(levels)):
+        levels[k] = unseen[k + len(unseen) - len(levels)] | level
+    share[:] = 1.0
+
+
+@kernel
 def fill_share(
     cells: ShownCells,
     marked: Flags,
+    place: Labels,
     footprint: Footprints,
     assigned: PixelAssignment,
     distance: Singles,
@@ -131,29 +145,30 @@ def fill_share(
     ----------
     marked : bool (block,)
         Blocks at which the view shows something.
-    footprint : int16 (cell, 4)
-        In block order.
+    place : int32 (cell,), footprint : int16 (cell, 4)
+        In block order; see `CellTables`.
     distance : float32 (place,)
         In block order, of each ground cell from the camera along the ground, metres.
     """
     for b in range(len(cells.start) - 1):
         if not marked[cells.block[b]]:
             continue
+        shift = cells.first[b] - cells.start[b]
         for k in range(cells.start[b], cells.start[b + 1]):
-            left, top, width, height = footprint[np.uint64(cells.cell[k])]
+            left, top, width, height = footprint[np.uint64(k + shift)]
             nearest = cells.near_person[k]
             if width == 0 or (nearest >= 0 and assigned.separate[nearest]):
                 continue
             if _shows_a_person(assigned, left, top, width, height):
-                hidden = _hidden_pixels(assigned, left, top, width, height, nearest, distance[cells.place[k]])
+                hidden = _hidden_pixels(assigned, left, top, width, height, nearest, distance[place[k + shift]])
                 share[k] = np.float32(1) - np.float32(hidden) / np.float32(np.int32(width) * np.int32(height))
 
 
 @kernel
 def fill_map(
-    view: int,
     cells: ShownCells,
     marked: Flags,
+    place: Labels,
     footprint: Footprints,
     table: SumTable,
     assigned: PixelAssignment,
@@ -161,36 +176,24 @@ def fill_map(
     levels: Levels,
     share: Singles,
 ) -> None:
-    """Fill levels and share (n + k,) of a view with a map; UNSEEN where it does not see a cell.
+    """Fill levels and share (n,) of a view with a map in the marked blocks; elsewhere they are those of `fill_empty`.
 
-    The level is the mean over the visible pixels of the footprint, those of other persons counted as background. Blocks
-    marked bool (block,) are those at which the view shows something: elsewhere levels are the lowest, and nothing is
-    hidden.
+    The level is the mean over the visible pixels of the footprint, those of other persons counted as background. The
+    parameters are those of `fill_share`.
     """
     pixels, columns = _shown_pixels(table, assigned), table.sums.shape[1] - 1
-    empty, unseen = np.int16(table.lowest), cells.unseen[view]
     for b in range(len(cells.start) - 1):
         if not marked[np.uint64(cells.block[b])]:
-            _fill_empty(cells.start[b], cells.start[b + 1], empty, unseen, levels, share)
             continue
+        shift = cells.first[b] - cells.start[b]
         for k in range(np.uint64(cells.start[b]), np.uint64(cells.start[b + 1])):
-            left, top, width, height = footprint[np.uint64(cells.cell[k])]
-            nearest, far = cells.near_person[k], distance[np.uint64(cells.place[k])]
+            left, top, width, height = footprint[np.uint64(k + shift)]
+            nearest, far = cells.near_person[k], distance[np.uint64(place[np.uint64(k + shift)])]
             if height == 1 and width <= 2:
                 first = (top - table.top) * columns + left - table.left
                 levels[k], share[k] = _of_two_pixels(first, first + width - 1, nearest, far, pixels, assigned)
             else:
                 levels[k], share[k] = _of_pixels(left, top, width, height, nearest, far, table, assigned)
-    _fill_empty(cells.start[-1], len(levels), empty, unseen, levels, share)
-
-
-@part
-def _fill_empty(first: int, stop: int, empty: np.int16, unseen: Levels, levels: Levels, share: Singles) -> None:
-    """Fill the levels of cells at which a view shows nothing: all bits of UNSEEN are set."""
-    for k in range(np.uint64(first), np.uint64(stop)):
-        levels[k] = unseen[k] | empty
-    for k in range(np.uint64(first), np.uint64(stop)):
-        share[k] = np.float32(1)
 
 
 @kernel

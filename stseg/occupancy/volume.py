@@ -22,7 +22,7 @@ from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_per
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 from stseg.occupancy.revision import NEAR_PRIOR, cell_prior_log_odds
 from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_map
-from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_share, mark_people
+from stseg.occupancy.visible_cells import PixelAssignment, fill_empty, fill_map, fill_share, mark_people
 from stseg.records.people import Explanation
 from stseg.records.sparse_volume import SparseVolume
 
@@ -32,12 +32,16 @@ _UNOCCLUDED = 0.99
 
 
 class _PreparedView(NamedTuple):
-    """A view in a frame: its people, blocks that show them or foreground, sums of its map or the fit of its boxes."""
+    """A view in a frame: its people, blocks that show them or foreground, and the sums of its map.
+
+    Or the fit of its boxes, and the blocks of the ground near people or above which a box might show something.
+    """
 
     assignment: PixelAssignment
     marked: Flags
     table: SumTable | None
     fit: CellFit | None
+    columns: Flags
 
 
 class _Fused(NamedTuple):
@@ -121,35 +125,34 @@ class Occupancy:
         self, evidence: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[ErrorRates], noise: BoxNoise
     ) -> _Fused:
         near_person = nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
+        near = CellsByPerson.of(near_person, len(explanation.people))
         views = [
-            None if view is None else self._prepared(i, view, explanation, near_person, noise)
+            None if view is None else self._prepared(i, view, explanation, near, noise)
             for i, view in enumerate(evidence)
         ]
+        columns = [self._columns(near_person >= 0), *(view.columns for view in views if view is not None)]
         marked = [view.marked for view in views if view is not None]
-        marked_blocks = np.logical_or.reduce([self._near_people(views, near_person), *marked])
-        cells = self._tables.cells_at(marked_blocks, near_person)
+        above = np.tile(np.logical_or.reduce(columns), self.rig.grid.planes)
+        cells = self._tables.cells_at(np.logical_or.reduce([above, *marked]), near_person)
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(evidence)]))
         terms = self._terms(views, cells, explanation, rates, weights.astype(np.float32))
         return _Fused(cells, near_person, terms, Sums.of(terms))
 
     def _prepared(
-        self, i: int, view: Boxes | Singles, explanation: Explanation, near_person: Ints, noise: BoxNoise
+        self, i: int, view: Boxes | Singles, explanation: Explanation, near: CellsByPerson, noise: BoxNoise
     ) -> _PreparedView:
         assignment, marked = self._assignment(i, explanation), self._tables.nothing_marked()
         mark_people(self._tables.reach[i], assignment, marked)
         if isinstance(view, Boxes):
-            return _PreparedView(assignment, marked, None, self._fit(i, view, explanation, near_person, noise))
+            fit = self._fit(i, view, explanation, near, noise)
+            return _PreparedView(assignment, marked, None, fit, self._columns(fit.found | (near.near_person >= 0)))
         table = self._sums[i].filled(view)
         mark_map(self._tables.reach[i], table, marked)
-        return _PreparedView(assignment, marked, table, None)
+        return _PreparedView(assignment, marked, table, None, self._columns(near.near_person >= 0))
 
-    def _near_people(self, views: Sequence[_PreparedView | None], near_person: Ints) -> Flags:
-        """The blocks above the ground near people, and above the cells that a box might show."""
-        columns = near_person >= 0
-        for view in views:
-            if view is not None and view.fit is not None:
-                columns |= view.fit.found
-        return np.tile(np.logical_or.reduceat(columns, self._tables.ground_start), self.rig.grid.planes)
+    def _columns(self, places: Flags) -> Flags:
+        """The blocks of the ground that have one of the places (place,), bool (block of one plane,)."""
+        return np.logical_or.reduceat(places, self._tables.ground_start)
 
     def _terms(
         self,
@@ -160,17 +163,14 @@ class Occupancy:
         weights: Singles,
     ) -> FrameTerms:
         """Terms of the views at the cells that are fused one by one, and at the representatives of the others."""
-        levels, share = self._levels_and_shares(cells.unseen.shape)
+        levels, share = self._levels_and_shares((len(views), len(cells.near_person)))
         confidence = np.ones((len(views), len(explanation.people)), np.float32)
         for i, view in enumerate(views):
             if view is None:
                 levels[i] = UNSEEN
                 continue
-            if view.table is None:
-                empty = int(level_of_match(0.0, rates[i].miss, rates[i].clutter))
-                np.bitwise_or(cells.unseen[i], np.int16(empty), out=levels[i])  # all bits of UNSEEN are set
-                missing = np.where(view.assignment.separate[:-1], 1.0, explanation.people.visibility[i])
-                confidence[i] = missing.astype(np.float32)
+            if view.fit is not None:
+                confidence[i] = np.where(view.assignment.separate[:-1], 1.0, explanation.people.visibility[i])
             self._fill_view(i, view, cells, rates[i], levels[i], share[i])
         terms = np.stack([log_odds_terms(one) for one in rates])
         return FrameTerms(levels, share, cells.near_person, terms, weights, confidence)
@@ -178,14 +178,17 @@ class Occupancy:
     def _fill_view(
         self, i: int, view: _PreparedView, cells: ShownCells, rates: ErrorRates, levels: Levels, share: Singles
     ) -> None:
-        """Fill levels and share (n + k,) of a view; those of boxes at representatives are filled before."""
-        footprint, distance = self._tables.footprint[i], self._distance[i]
+        """Fill levels and share (n + k,) of a view."""
+        tables, assignment, distance = self._tables, view.assignment, self._distance[i]
+        footprint, unseen = tables.footprint[i], tables.unseen[i]
         if view.table is not None:
-            fill_map(i, cells, view.marked, footprint, view.table, view.assignment, distance, levels, share)
+            fill_empty(cells, unseen, view.table.lowest, levels, share)
+            fill_map(cells, view.marked, tables.place, footprint, view.table, assignment, distance, levels, share)
         elif view.fit is not None:
-            share[:] = 1.0
-            fill_share(cells, view.marked, footprint, view.assignment, distance, share)
-            fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels)
+            fill_empty(cells, unseen, level_of_match(0.0, rates.miss, rates.clutter), levels, share)
+            fill_share(cells, view.marked, tables.place, footprint, assignment, distance, share)
+            planes = self.rig.grid.heights
+            fill_levels(view.fit, self.heights, planes, cells, view.columns, tables.place, rates, levels)
 
     def _levels_and_shares(self, shape: tuple[int, ...]) -> tuple[Levels, Singles]:
         """Memory for levels and shares (view, n + k), valid until the next frame: large new memory is slow."""
@@ -218,7 +221,7 @@ class Occupancy:
             fused.terms,
             fused.sums,
             inside,
-            cells.number,
+            cells.numbers(),
             trusted,
             np.array(estimate.rates),
             self.config.effective_observations,
@@ -252,7 +255,7 @@ class Occupancy:
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 
-    def _fit(self, i: int, view: Boxes, explanation: Explanation, near_person: Ints, noise: BoxNoise) -> CellFit:
+    def _fit(self, i: int, view: Boxes, explanation: Explanation, near: CellsByPerson, noise: BoxNoise) -> CellFit:
         """Fit of the boxes of a view to bodies at the ground cells."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
@@ -263,10 +266,9 @@ class Occupancy:
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
         boxes = ViewBoxes(edges, *noise.of(view.score), width, height)
-        cells = CellsByPerson.of(near_person, len(people))
         priors = self._log_height_around(np.array([self.height_mean]))[0], self._log_height_around(people.height)
-        fit = CellFit.unfilled(len(self.heights), near_person.size)
-        fill_fit(pillars[1], pillars[0], *priors, boxes, owner, cells, fit)
+        fit = CellFit.unfilled(len(self.heights), near.near_person.size)
+        fill_fit(pillars[1], pillars[0], *priors, boxes, owner, near, fit)
         return fit
 
     def _log_height_around(self, expected: Floats) -> Floats:

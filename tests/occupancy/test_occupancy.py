@@ -20,7 +20,7 @@ from stseg.config import OccupancyConfig
 from stseg.geometry import Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
-from stseg.occupancy.box_planes import CellFit, CellsByPerson, fill_fit, fill_levels, plane_likelihood
+from stseg.occupancy.box_planes import CellFit, CellsByPerson, fill_fit, fill_levels, level_of_match, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 from stseg.occupancy.shown_cells import CellTables, ShownCells
@@ -140,13 +140,13 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     index, cells = PillarIndex.of(pillars, camera.size), CellsByPerson.of(near_person, 2)
     fill_fit(index, pillars, prior[0], prior[1:], view, box_owner, cells, fit)
     rates, levels = ErrorRates(0.1, 0.2, 0.3), np.empty((4, 16), np.int16)
-    footprint = np.ones((4, 16, 4), np.int16)
-    footprint[2, 5] = 0
+    levels[:] = level_of_match(0.0, rates.miss, rates.clutter)
+    levels[2, 5] = UNSEEN
     every = np.arange(levels.size, dtype=np.int32)
     person = np.tile(near_person.ravel(), 4).astype(np.int32)
-    unseen = np.zeros((1, levels.size), np.int16)
-    listed = ShownCells(every, every % 16, every, every, every, unseen, person, np.ones(levels.size))
-    fill_levels(fit, tried, grid.heights, listed, footprint.reshape(-1, 4), rates, levels.reshape(-1))
+    listed = ShownCells(every, np.append(every, 64).astype(np.int32), every, every, np.zeros(0), person)
+    marked = fit.found | (near_person.ravel() >= 0)
+    fill_levels(fit, tried, grid.heights, listed, marked, every % 16, rates, levels.reshape(-1))
     for cell, (y, x) in enumerate(np.ndindex(4, 4)):
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near_person[y, x])]
         clutter_rate = rates.clutter if near_person[y, x] < 0 else rates.near_clutter
@@ -321,6 +321,6 @@ def test_cells_kept_from_the_frame_before_are_those_of_this_one() -> None:
         marked[block] = True  # in place: what is kept is no view of it
         near_person = np.full(COARSE.grid.shape[1:], block).reshape(-1)
         fresh = CellTables(footprint).cells_at(marked, near_person)
-        assert len(fresh.cell)
+        assert len(fresh.in_volume)
         for own, other in zip(kept.cells_at(marked, near_person), fresh, strict=True):
             np.testing.assert_array_equal(own, other)

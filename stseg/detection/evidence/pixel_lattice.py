@@ -22,7 +22,7 @@ class PillarBoxes(NamedTuple):
     """What bounds the outlines of all heights, in the cells of the lattice or in its strips (n,)."""
 
     box: Shorts
-    """int16 (view, n, 4): left, top, right, bottom of the box around them, raster pixels; right 0 where there is none."""
+    """int16 (view, n, 4): left, top, right, bottom of the box around them, raster pixels; right 0 for none."""
     inside_share: Floats
     """float64 (view, n): the least share of an outline that lies on the raster."""
     pixel_share: Floats
