@@ -22,7 +22,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats
+from stseg.arrays import Flags, Floats, Ints
 from stseg.bodies.pillars import PROFILE
 from stseg.config import ErrorRateConfig
 from stseg.geometry import Grid
@@ -113,6 +113,7 @@ def fill_counts(
     views: FrameTerms,
     sums: Sums,
     inside: Flags,
+    counted: Ints,
     number: Floats,
     trusted: Flags,
     rates: Floats,
@@ -127,8 +128,10 @@ def fill_counts(
     ----------
     views, sums
         The views' terms, and their sums.
-    inside : bool (n,), number : float64 (n,)
-        Whether the pillar of the person near it fills each cell, and cells that it stands for where none is near.
+    inside : bool (n,)
+        Whether the pillar of the person near it fills each cell.
+    counted : int64 (c,), number : float64 (c,)
+        The cells that are counted, and those that each stands for where no person is near.
     trusted : bool (view, person)
         Persons supported by the rest of the evidence, and not hidden from the view.
     rates : float64 (view, 3)
@@ -141,19 +144,17 @@ def fill_counts(
     errors[:], trials[:] = 0.0, 0.0
     wrong, empty, all_wrong, all_empty = np.zeros((4, len(views.weight)))
     last = -1
-    for c in range(len(views.near_person)):
+    for k, c in enumerate(counted):
         if views.near_person[c] >= 0:
             _count_beside_person(views, c, inside[c], trusted, rates, errors, trials)
             continue
-        if number[c] == 0.0:
-            continue
-        if last < 0 or number[c] != number[last] or not _are_seen_alike(views, c, last):
-            last = c
+        if last < 0 or number[k] != number[last] or not _are_seen_alike(views, c, counted[last]):
+            last = k
             for i in range(len(wrong)):
                 level, share = views.levels[i, c], views.share[i, c]
                 wrong[i], empty[i] = 0.0, 0.0
                 if level >= 0 and share > 0.0:
-                    empty[i] = number[c] * share / (1.0 + _occupied_odds(views, sums, i, c, observations, prior))
+                    empty[i] = number[k] * share / (1.0 + _occupied_odds(views, sums, i, c, observations, prior))
                     wrong[i] = _error_posterior(rates[i, CLUTTER], level / TOP_LEVEL) * empty[i]
         for i in range(len(wrong)):
             all_wrong[i] += wrong[i]

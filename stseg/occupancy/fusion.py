@@ -26,11 +26,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.arrays import Labels, Singles
-from stseg.geometry.summed_area import TOP_LEVEL, Levels
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.kernels.accelerate import kernel, part, wide_kernel
 
-_CELLS_AT_ONCE = 2048
-"""Cells that are summed over all views before the next ones: as many as the fastest memory holds."""
+_CELLS_AT_ONCE = 256
+"""Cells that are summed over all views before the next ones; a view that sees none of them costs nothing."""
 
 
 class ErrorRates(NamedTuple):
@@ -140,7 +140,11 @@ def fill_sums(views: FrameTerms, sums: Sums) -> None:
         weighted, weights, visible = sums.weighted[cells], sums.weights[cells], sums.shares[cells]
         for i in range(len(views.weight)):
             weight, terms = views.weight[i], views.terms[i, 0]
-            levels, shares = views.levels[i, cells], views.share[i, cells]
+            levels, shares, highest = views.levels[i, cells], views.share[i, cells], np.int16(UNSEEN)
+            for c in range(len(levels)):
+                highest = max(highest, levels[c])
+            if highest == UNSEEN:
+                continue
             for c in range(len(levels)):  # a loop of its own, so that the other becomes vector code
                 term[c] = terms[np.uint32(max(levels[c], 0))]
             for c in range(len(levels)):

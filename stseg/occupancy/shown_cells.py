@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable, sum_of
-from stseg.kernels.accelerate import kernel
+from stseg.kernels.accelerate import kernel, part
 
 BLOCK_SIDE = 4
 """Cells along the side of a block."""
@@ -83,16 +83,17 @@ class ShownCells(NamedTuple):
     others: Floats
     near_person: Labels
 
-    def numbers(self) -> Floats:
-        """Cells that each stands for where some are counted for all, 0 for those left out: float64 (n + k,).
+    def counted(self) -> tuple[Ints, Floats]:
+        """Those that are counted, near a person or for others as well, and the number that each of these stands for.
 
         Cells of a block show nearly the same pixels.
         """
-        count, side = len(self.in_volume), BLOCK_SIDE**2
-        stride = 1 + count // _MOST_COUNTED
-        number = np.zeros((1 + count // (stride * side), stride, side))
-        number[:, 0] = stride
-        return np.append(number.reshape(-1)[:count], self.others)
+        listed, side, is_counted = len(self.in_volume), BLOCK_SIDE**2, self.near_person >= 0
+        stride, is_counted[listed:] = 1 + listed // _MOST_COUNTED, True
+        for cell in range(side):
+            is_counted[cell : listed : stride * side] = True
+        cells = np.flatnonzero(is_counted)
+        return cells, np.where(cells < listed, stride, self.others[np.maximum(cells - listed, 0)])
 
 
 class CellTables:
@@ -186,24 +187,37 @@ class CellTables:
         return cells
 
 
+@part
+def adjacent_cells(cells: ShownCells, block: int) -> tuple[slice, slice, int]:
+    """The cells of a block and of those behind it as far as they lie side by side, as listed and among all.
+
+    And the first block behind these.
+    """
+    stop, first = block + 1, cells.first[block]
+    while stop < len(cells.block) and cells.first[stop] - cells.start[stop] == first - cells.start[block]:
+        stop += 1
+    listed = slice(cells.start[block], cells.start[stop])
+    return listed, slice(first, first + cells.start[stop] - cells.start[block]), stop
+
+
 @kernel
 def _fill_cells(cells: ShownCells, in_volume: Labels, of_cell: Labels) -> None:
     """Fill the indices in the volume, from those (cell,) of all, and take what is listed off the numbers of others."""
-    for b in range(len(cells.block)):
-        shift = cells.first[b] - cells.start[b]
-        for k in range(cells.start[b], cells.start[b + 1]):
-            cells.in_volume[k] = in_volume[k + shift]
-        for k in range(cells.start[b], cells.start[b + 1]):
-            cells.others[of_cell[k + shift]] -= 1
+    b = 0
+    while b < len(cells.block):
+        listed, every, b = adjacent_cells(cells, b)
+        cells.in_volume[listed] = in_volume[every]
+        for one in of_cell[every]:
+            cells.others[one] -= 1
 
 
 @kernel
 def _fill_near(cells: ShownCells, place: Labels, near_person: Ints) -> None:
     """Fill the person near each cell listed, from that near each place (place,)."""
-    for b in range(len(cells.block)):
-        shift = cells.first[b] - cells.start[b]
-        for k in range(cells.start[b], cells.start[b + 1]):
-            cells.near_person[k] = near_person[place[k + shift]]
+    b = 0
+    while b < len(cells.block):
+        listed, every, b = adjacent_cells(cells, b)
+        cells.near_person[listed] = near_person[place[every]]
 
 
 @kernel

@@ -15,7 +15,7 @@ from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels, SumTable, sum_of
 from stseg.kernels.accelerate import kernel, part
-from stseg.occupancy.shown_cells import Reach, ShownCells
+from stseg.occupancy.shown_cells import Reach, ShownCells, adjacent_cells
 
 SHOULDER = 0.3
 """A person hides what is at least this much farther from the camera than they are, metres."""
@@ -119,13 +119,13 @@ def mark_people(reach: Reach, assigned: PixelAssignment, marked: Flags) -> None:
 @kernel
 def fill_empty(cells: ShownCells, unseen: Levels, empty: int, levels: Levels, share: Singles) -> None:
     """Fill levels and share (n + k,) of a view as if it showed nothing; see `CellTables.unseen`."""
-    level, after = np.int16(empty), cells.start[-1]  # all bits of UNSEEN are set
-    for b in range(len(cells.block)):
-        shift = cells.first[b] - cells.start[b]
-        for k in range(cells.start[b], cells.start[b + 1]):
-            levels[k] = unseen[k + shift] | level
-    for k in range(after, len(levels)):
-        levels[k] = unseen[k + len(unseen) - len(levels)] | level
+    b, level, sets = 0, np.int16(empty), len(levels) - cells.start[-1]
+    while b < len(cells.block):
+        listed, every, b = adjacent_cells(cells, b)
+        levels[listed] = unseen[every]
+    levels[cells.start[-1] :] = unseen[len(unseen) - sets :]
+    for k in range(len(levels)):
+        levels[k] |= level  # all bits of UNSEEN are set
     share[:] = 1.0
 
 

@@ -221,7 +221,7 @@ class Occupancy:
             fused.terms,
             fused.sums,
             inside,
-            cells.numbers(),
+            *cells.counted(),
             trusted,
             np.array(estimate.rates),
             self.config.effective_observations,

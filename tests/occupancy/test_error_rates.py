@@ -54,8 +54,8 @@ def teach(
     )  # fmt: skip
     sums = Sums.of(terms)
     errors, seen = np.full((2, views, 3), np.nan)
-    number, by_all = np.ones(inside.size), np.tile(trusted, (views, 1))
-    fill_counts(terms, sums, inside.ravel(), number, by_all, np.array(rates), worth, PRIOR, errors, seen)
+    counted, by_all = (np.arange(inside.size), np.ones(inside.size)), np.tile(trusted, (views, 1))
+    fill_counts(terms, sums, inside.ravel(), *counted, by_all, np.array(rates), worth, PRIOR, errors, seen)
     return errors[view], seen[view]
 
 
