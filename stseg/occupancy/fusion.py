@@ -92,9 +92,9 @@ class Sums(NamedTuple):
     shares: Singles
 
     @classmethod
-    def of(cls, views: FrameTerms) -> Self:
-        """Sums over all views."""
-        sums = cls(*np.zeros((3, len(views.near_person)), np.float32))
+    def of(cls, views: FrameTerms, memory: Singles | None = None) -> Self:
+        """Sums over all views, in memory float32 (3, n) if it is given."""
+        sums = cls(*(np.empty((3, len(views.near_person)), np.float32) if memory is None else memory))
         fill_sums(views, sums)
         return sums
 
@@ -133,11 +133,12 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
 
 @kernel
 def fill_sums(views: FrameTerms, sums: Sums) -> None:
-    """Add what all views see to sums, 0 before."""
+    """Fill sums with what all views see."""
     number, term = len(views.near_person), np.empty(_CELLS_AT_ONCE, np.float32)
     for first in range(0, number, _CELLS_AT_ONCE):
         cells = slice(first, min(first + _CELLS_AT_ONCE, number))
         weighted, weights, visible = sums.weighted[cells], sums.weights[cells], sums.shares[cells]
+        weighted[:], weights[:], visible[:] = 0.0, 0.0, 0.0
         for i in range(len(views.weight)):
             weight, terms = views.weight[i], views.terms[i, 0]
             levels, shares, highest = views.levels[i, cells], views.share[i, cells], np.int16(UNSEEN)

@@ -120,12 +120,12 @@ def mark_people(reach: Reach, assigned: PixelAssignment, marked: Flags) -> None:
 def fill_empty(cells: ShownCells, unseen: Levels, empty: int, levels: Levels, share: Singles) -> None:
     """Fill levels and share (n + k,) of a view as if it showed nothing; see `CellTables.unseen`."""
     b, level, sets = 0, np.int16(empty), len(levels) - cells.start[-1]
+    levels[cells.start[-1] :] = unseen[len(unseen) - sets :] | level  # all bits of UNSEEN are set
     while b < len(cells.block):
         listed, every, b = adjacent_cells(cells, b)
-        levels[listed] = unseen[every]
-    levels[cells.start[-1] :] = unseen[len(unseen) - sets :]
-    for k in range(len(levels)):
-        levels[k] |= level  # all bits of UNSEEN are set
+        own, before = levels[listed], unseen[every]
+        for k in range(len(own)):
+            own[k] = before[k] | level
     share[:] = 1.0
 
 

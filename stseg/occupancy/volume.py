@@ -34,14 +34,13 @@ _UNOCCLUDED = 0.99
 class _PreparedView(NamedTuple):
     """A view in a frame: its people, blocks that show them or foreground, and the sums of its map.
 
-    Or the fit of its boxes, and the blocks of the ground near people or above which a box might show something.
+    Or the fit of its boxes, with the blocks of the ground near people or above which a box might show something.
     """
 
     assignment: PixelAssignment
     marked: Flags
     table: SumTable | None
-    fit: CellFit | None
-    columns: Flags
+    fit: tuple[CellFit, Flags] | None
 
 
 class _Fused(NamedTuple):
@@ -77,7 +76,7 @@ class Occupancy:
         self._ground = rig.grid.ground.reshape(-1, 2).take(order, 0)
         self._distance = sampling.distance.reshape(len(kinds), -1).take(order, 1)
         self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]
-        self._memory = np.empty(0, np.int16), np.empty(0, np.float32)
+        self._memory = np.empty(0, np.int16), np.empty(0, np.float32), np.empty(0, np.float32)
         self._first_rates = [_first_rates(kind, detection) for kind in kinds]
         self._rate_config = rates or ErrorRateConfig()
 
@@ -130,13 +129,15 @@ class Occupancy:
             None if view is None else self._prepared(i, view, explanation, near, noise)
             for i, view in enumerate(evidence)
         ]
-        columns = [self._columns(near_person >= 0), *(view.columns for view in views if view is not None)]
+        columns = [view.fit[1] for view in views if view is not None and view.fit is not None]
+        columns = columns or [self._columns(near_person >= 0)]
         marked = [view.marked for view in views if view is not None]
         above = np.tile(np.logical_or.reduce(columns), self.rig.grid.planes)
         cells = self._tables.cells_at(np.logical_or.reduce([above, *marked]), near_person)
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(evidence)]))
         terms = self._terms(views, cells, explanation, rates, weights.astype(np.float32))
-        return _Fused(cells, near_person, terms, Sums.of(terms))
+        memory = self._memory_of(len(views), len(cells.near_person))[2]
+        return _Fused(cells, near_person, terms, Sums.of(terms, memory))
 
     def _prepared(
         self, i: int, view: Boxes | Singles, explanation: Explanation, near: CellsByPerson, noise: BoxNoise
@@ -145,10 +146,10 @@ class Occupancy:
         mark_people(self._tables.reach[i], assignment, marked)
         if isinstance(view, Boxes):
             fit = self._fit(i, view, explanation, near, noise)
-            return _PreparedView(assignment, marked, None, fit, self._columns(fit.found | (near.near_person >= 0)))
+            return _PreparedView(assignment, marked, None, (fit, self._columns(fit.found | (near.near_person >= 0))))
         table = self._sums[i].filled(view)
         mark_map(self._tables.reach[i], table, marked)
-        return _PreparedView(assignment, marked, table, None, self._columns(near.near_person >= 0))
+        return _PreparedView(assignment, marked, table, None)
 
     def _columns(self, places: Flags) -> Flags:
         """The blocks of the ground that have one of the places (place,), bool (block of one plane,)."""
@@ -163,7 +164,7 @@ class Occupancy:
         weights: Singles,
     ) -> FrameTerms:
         """Terms of the views at the cells that are fused one by one, and at the representatives of the others."""
-        levels, share = self._levels_and_shares((len(views), len(cells.near_person)))
+        levels, share = self._memory_of(len(views), len(cells.near_person))[:2]
         confidence = np.ones((len(views), len(explanation.people)), np.float32)
         for i, view in enumerate(views):
             if view is None:
@@ -185,18 +186,18 @@ class Occupancy:
             fill_empty(cells, unseen, view.table.lowest, levels, share)
             fill_map(cells, view.marked, tables.place, footprint, view.table, assignment, distance, levels, share)
         elif view.fit is not None:
-            fill_empty(cells, unseen, level_of_match(0.0, rates.miss, rates.clutter), levels, share)
+            fill_empty(cells, unseen, int(level_of_match(0.0, rates.miss, rates.clutter)), levels, share)
             fill_share(cells, view.marked, tables.place, footprint, assignment, distance, share)
-            planes = self.rig.grid.heights
-            fill_levels(view.fit, self.heights, planes, cells, view.columns, tables.place, rates, levels)
+            planes, (fit, columns) = self.rig.grid.heights, view.fit
+            fill_levels(fit, self.heights, planes, cells, columns, tables.place, rates, levels)
 
-    def _levels_and_shares(self, shape: tuple[int, ...]) -> tuple[Levels, Singles]:
-        """Memory for levels and shares (view, n + k), valid until the next frame: large new memory is slow."""
-        number = int(np.prod(shape))
-        if len(self._memory[0]) < number:
-            self._memory = np.empty(number, np.int16), np.empty(number, np.float32)
-        levels, share = self._memory
-        return levels[:number].reshape(shape), share[:number].reshape(shape)
+    def _memory_of(self, views: int, cells: int) -> tuple[Levels, Singles, Singles]:
+        """Levels and shares (view, n + k) and sums (3, n + k), valid until the next frame: large new memory is slow."""
+        size, shape = views * cells, (views, cells)
+        if len(self._memory[0]) < size:
+            self._memory = np.empty(size, np.int16), np.empty(size, np.float32), np.empty(3 * cells, np.float32)
+        levels, share, sums = self._memory
+        return levels[:size].reshape(shape), share[:size].reshape(shape), sums[: 3 * cells].reshape(3, cells)
 
     def _volume(self, fused: _Fused) -> SparseVolume:
         number = len(fused.cells.in_volume)

@@ -108,11 +108,10 @@ class GroundPatches:
         return np.where(self.place >= 0, values.reshape(-1)[self.place], np.zeros(1, values.dtype))
 
     def on_ground(self, values: AnyArray) -> AnyArray:
-        """Values on the sheet (..., row, column) at their ground cells (..., y, x), 0 outside the patches."""
-        on_sheet = values.reshape(*values.shape[:-2], self.place.size)[..., self.on_sheet_at]
-        outside = self.on_sheet_at < 0
-        on_sheet[..., outside] = 0
-        return on_sheet.reshape(*values.shape[:-2], *self.grid.shape[1:])
+        """Values on the sheet (row, column) at their ground cells (y, x), 0 outside the patches."""
+        ground, inside = np.zeros(self.grid.shape[1:], values.dtype), self.place >= 0
+        ground.reshape(-1)[self.place[inside]] = values[inside]
+        return ground
 
     def log_odds(self, volume: SparseVolume) -> Singles:
         """A frame's log-odds on the sheet, float32 (plane, row, column), nats; nan where no view sees the cell."""
