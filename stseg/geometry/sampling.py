@@ -73,22 +73,12 @@ def _span(first: NDArray[np.int16], extent: NDArray[np.int16]) -> slice:
 
 def _footprints(camera: Camera, rig: Rig, kind: SamplingKind) -> Footprints:
     footprint, within = np.zeros((*rig.grid.shape, 4), np.int16), rig.grid.inside()
-    lens = LensTerms.of(camera.lens)
+    lens, ground, projection = LensTerms.of(camera.lens), rig.grid.ground, camera.projection
     shift = (_DERIVATIVE_STEP * rig.grid.cell / 2) if kind == "footprint" else 0.0
-    for plane, height in enumerate(rig.grid.heights):
-        centre, ahead = camera.project(rig.grid.ground, float(height))
+    for boxes, height in zip(footprint, rig.grid.heights.tolist(), strict=True):
+        centre, ahead = camera.project(ground, height)
         visible = ahead & camera.inside(centre) & within
-        _fill_boxes(
-            rig.grid.ground,
-            float(height),
-            camera.projection,
-            lens,
-            centre,
-            visible,
-            shift,
-            camera.size,
-            footprint[plane],
-        )
+        _fill_boxes(ground, height, projection, lens, centre, visible, shift, camera.size, boxes)
     return footprint
 
 

@@ -136,18 +136,10 @@ def fill_levels(
     rates: ErrorRates,
     levels: Levels,
 ) -> None:
-    """Fill levels (n,) with L of each cell that the view sees in the marked blocks; UNSEEN elsewhere before, or empty.
+    """Fill levels (n,), which are those of `fill_empty`, with L of the cells near a person, or that a box fits.
 
-    Parameters
-    ----------
-    fit
-        From `fill_fit`.
-    heights : float64 (height,), planes : float64 (plane,)
-        Metres, rising.
-    marked : bool (block of one plane,)
-        Those with a cell that a box might show, or near a person.
-    places : int32 (cell,)
-        In block order; see `CellTables`.
+    Heights float64 (height,) and planes float64 (plane,) are in metres, rising. Blocks of the ground with such cells
+    are marked, bool (block of one plane,); `places` int32 (cell,) is that of `CellTables`.
     """
     first_taller = np.searchsorted(heights, planes)
     unfit = level_of_match(0.0, rates.miss, rates.near_clutter)

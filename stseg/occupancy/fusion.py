@@ -101,14 +101,8 @@ class Sums(NamedTuple):
     def total(self, near_person: Labels, observations: float, priors: tuple[float, float]) -> Singles:
         """k n_vis sum_i w_i term_i and the prior of each cell, nats, float32 (n,); where all are hidden the prior.
 
-        Parameters
-        ----------
-        near_person : int32 (n,)
-            The person near each cell, -1 for none.
-        observations
-            k.
-        priors
-            log(pi / (1 - pi)) near no person, and within reach of a person.
+        `near_person` int32 (n,) is that of `FrameTerms`, `observations` is k, and `priors` are log(pi / (1 - pi)) near
+        no person and within reach of one.
         """
         total = np.empty(len(near_person), np.float32)
         fill_total(self, near_person, np.float32(observations), np.float32(priors[0]), np.float32(priors[1]), total)

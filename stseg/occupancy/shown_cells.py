@@ -160,14 +160,9 @@ class CellTables:
         return np.zeros(len(self._width), bool)
 
     def cells_at(self, marked: Flags, near_person: Ints) -> ShownCells:
-        """The cells of the marked blocks, as far as a view sees them.
+        """The cells of the marked blocks bool (block,), as far as a view sees them, valid until the next are asked for.
 
-        Parameters
-        ----------
-        marked : bool (block,)
-            Blocks at which a view shows something, or near a person.
-        near_person : int64 (place,)
-            The person near each ground cell, -1 for none.
+        `near_person` int64 (place,) is the person near each ground cell, -1 for none.
         """
         if marked.mean() > _NEARLY_ALL:
             marked = np.ones_like(marked)

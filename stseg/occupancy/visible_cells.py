@@ -123,9 +123,9 @@ def fill_empty(cells: ShownCells, unseen: Levels, empty: int, levels: Levels, sh
     levels[cells.start[-1] :] = unseen[len(unseen) - sets :] | level  # all bits of UNSEEN are set
     while b < len(cells.block):
         listed, every, b = adjacent_cells(cells, b)
-        own, before = levels[listed], unseen[every]
-        for k in range(len(own)):
-            own[k] = before[k] | level
+        target, source = levels[listed], unseen[every]
+        for k in range(len(target)):
+            target[k] = source[k] | level
     share[:] = 1.0
 
 
@@ -141,14 +141,8 @@ def fill_share(
 ) -> None:
     """Fill share (n,), 1 before, of the cells that a view sees: how much of each footprint no nearer person hides.
 
-    Parameters
-    ----------
-    marked : bool (block,)
-        Blocks at which the view shows something.
-    place : int32 (cell,), footprint : int16 (cell, 4)
-        In block order; see `CellTables`.
-    distance : float32 (place,)
-        In block order, of each ground cell from the camera along the ground, metres.
+    Blocks at which the view shows something are marked, bool (block,). `place` int32 (cell,) and `footprint` int16
+    (cell, 4) are those of `CellTables`; `distance` float32 (place,) is that from the camera along the ground, metres.
     """
     for b in range(len(cells.start) - 1):
         if not marked[cells.block[b]]:

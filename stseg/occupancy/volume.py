@@ -94,16 +94,8 @@ class Occupancy:
         """A frame's log-odds, nats; nan where no view sees the cell.
 
         The prior pi is one half within reach of a person of the explanation, since existence is already
-        decided there, and `occupied_share` elsewhere.
-
-        Parameters
-        ----------
-        evidence, explanation
-            Evidence of each view, and the people that explain it.
-        rates
-            Error rates of each view; by default the first guess.
-        noise
-            Noise of boxes; by default the first guess.
+        decided there, and `occupied_share` elsewhere. The explanation is that of the evidence of all views; error
+        rates and the noise of boxes are the first guess if they are not given.
         """
         return self._volume(self._fused(evidence, explanation, rates or self.new_error_rates().rates, noise))
 
@@ -124,9 +116,9 @@ class Occupancy:
         self, evidence: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[ErrorRates], noise: BoxNoise
     ) -> _Fused:
         near_person = nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
-        near = CellsByPerson.of(near_person, len(explanation.people))
+        vicinity = CellsByPerson.of(near_person, len(explanation.people))
         views = [
-            None if view is None else self._prepared(i, view, explanation, near, noise)
+            None if view is None else self._prepared(i, view, explanation, vicinity, noise)
             for i, view in enumerate(evidence)
         ]
         columns = [view.fit[1] for view in views if view is not None and view.fit is not None]
@@ -140,13 +132,14 @@ class Occupancy:
         return _Fused(cells, near_person, terms, Sums.of(terms, memory))
 
     def _prepared(
-        self, i: int, view: Boxes | Singles, explanation: Explanation, near: CellsByPerson, noise: BoxNoise
+        self, i: int, view: Boxes | Singles, explanation: Explanation, vicinity: CellsByPerson, noise: BoxNoise
     ) -> _PreparedView:
         assignment, marked = self._assignment(i, explanation), self._tables.nothing_marked()
         mark_people(self._tables.reach[i], assignment, marked)
         if isinstance(view, Boxes):
-            fit = self._fit(i, view, explanation, near, noise)
-            return _PreparedView(assignment, marked, None, (fit, self._columns(fit.found | (near.near_person >= 0))))
+            fit = self._fit(i, view, explanation, vicinity, noise)
+            columns = self._columns(fit.found | (vicinity.near_person >= 0))
+            return _PreparedView(assignment, marked, None, (fit, columns))
         table = self._sums[i].filled(view)
         mark_map(self._tables.reach[i], table, marked)
         return _PreparedView(assignment, marked, table, None)
@@ -214,24 +207,14 @@ class Occupancy:
         inside = np.zeros(len(cells.near_person), bool)
         inside[near_cells] = filled.reshape(-1)[cells.in_volume[near_cells]]
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
-        trials, errors = counts = np.empty((2, len(fused.terms.weight), 3))
+        counts, rates = np.empty((2, len(fused.terms.weight), 3)), np.array(estimate.rates)
         trusted = (people.evidence - people.view_evidence >= config.minimum_evidence) & (
             people.visibility >= _UNOCCLUDED
         )
-        fill_counts(
-            fused.terms,
-            fused.sums,
-            inside,
-            *cells.counted(),
-            trusted,
-            np.array(estimate.rates),
-            self.config.effective_observations,
-            self.prior,
-            errors,
-            trials,
-        )
+        priors = self.config.effective_observations, self.prior
+        fill_counts(fused.terms, fused.sums, inside, *cells.counted(), trusted, rates, *priors, *counts[::-1])
         visible = np.maximum(self._tables.sets.size @ self._tables.sets.seen_by, 1)
-        units = np.column_stack([np.full(len(errors), body), visible, np.full(len(errors), reached - body)])
+        units = np.column_stack([np.full(len(rates), body), visible, np.full(len(rates), reached - body)])
         supported = inside[near_cells][(people.evidence >= config.minimum_evidence)[cells.near_person[near_cells]]]
         filled_cells = np.array([len(supported), supported.sum()]) / reached
         estimate.learn(counts / units, filled_cells, estimate.interval)
@@ -256,7 +239,7 @@ class Occupancy:
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 
-    def _fit(self, i: int, view: Boxes, explanation: Explanation, near: CellsByPerson, noise: BoxNoise) -> CellFit:
+    def _fit(self, i: int, view: Boxes, explanation: Explanation, vicinity: CellsByPerson, noise: BoxNoise) -> CellFit:
         """Fit of the boxes of a view to bodies at the ground cells."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
@@ -268,8 +251,8 @@ class Occupancy:
         edges = edges.clip(0, [width - 1, height - 1] * 2)
         boxes = ViewBoxes(edges, *noise.of(view.score), width, height)
         priors = self._log_height_around(np.array([self.height_mean]))[0], self._log_height_around(people.height)
-        fit = CellFit.unfilled(len(self.heights), near.near_person.size)
-        fill_fit(pillars[1], pillars[0], *priors, boxes, owner, near, fit)
+        fit = CellFit.unfilled(len(self.heights), vicinity.near_person.size)
+        fill_fit(pillars[1], pillars[0], *priors, boxes, owner, vicinity, fit)
         return fit
 
     def _log_height_around(self, expected: Floats) -> Floats:

@@ -19,7 +19,7 @@ _PILLARS_AT_ONCE = 4096
 
 
 class PillarBoxes(NamedTuple):
-    """What bounds the outlines of all heights, in the cells of the lattice or in its strips (n,)."""
+    """Bounds of the outlines of all heights in the cells of the lattice, or in its strips (n,)."""
 
     box: Shorts
     """int16 (view, n, 4): left, top, right, bottom of the box around them, raster pixels; right 0 for none."""
@@ -40,12 +40,8 @@ class PixelLattice(NamedTuple):
     """int64 (view, 2): rows and columns of the rasters."""
     owner: Shorts
     """int16 (view, v * u): owners of the pixels of rasters, -1, but while a search uses them."""
-    above: Labels
-    """Scratch of `stseg.detection.evidence.unexplained_pixels`, allocated once."""
-    gain_above: Labels
-    """Scratch of the same, allocated once."""
-    left_of: Floats
-    """Scratch of the same, allocated once."""
+    sums: tuple[Floats, Labels, Labels]
+    """Memory for `left_of`, `above` and `gain_above` of `stseg.detection.evidence.unexplained_pixels`."""
 
     @classmethod
     def of(cls, views: Sequence[View], lattice_ground: Floats, body: BodyConfig) -> Self:
@@ -60,14 +56,14 @@ class PixelLattice(NamedTuple):
         rows, columns = shapes.max(0, initial=0)
         above, gain_above = np.empty((2, len(chosen), rows + 1, columns + 1), np.int32)
         owner = np.full((len(chosen), rows * columns), -1, np.int16)
-        left_of = np.empty((len(chosen), rows, columns + 1))
+        sums = np.empty((len(chosen), rows, columns + 1)), above, gain_above
         per_cell = (len(chosen), len(body.heights), len(lattice_ground))
         share = np.where(outlines.inside > 0, 1 / np.maximum(outlines.area, 1), 0.0)
         inside_share, pixel_share = (outlines.inside * share).reshape(per_cell).min(1), share.reshape(per_cell).max(1)
         first = np.arange(0, len(lattice_ground), STRIP_CELLS)
         in_strips = np.minimum.reduceat(inside_share, first, 1), np.maximum.reduceat(pixel_share, first, 1)
         cells = PillarBoxes(boxes, inside_share, pixel_share)
-        return cls(outlines, cells, PillarBoxes(strips, *in_strips), shapes, owner, above, gain_above, left_of)
+        return cls(outlines, cells, PillarBoxes(strips, *in_strips), shapes, owner, sums)
 
 
 def _drawn(

@@ -47,18 +47,9 @@ class UnexplainedPixels(NamedTuple):
     def of(cls, rasters: Singles, owners: Shorts, lattice: PixelLattice, extremes: Floats) -> Self:
         """From the log-odds of all pixels, float32 (view, v, u), and the members who explain them, int16 (pixel,)."""
         number, is_shown = lattice.shapes.prod(1), np.empty(lattice.strips.box.shape[:2], bool)
-        summed_to = np.zeros(rasters.shape[:2], np.uint64)
-        pixels = cls(
-            rasters,
-            owners,
-            number.cumsum() - number,
-            lattice.left_of,
-            summed_to,
-            lattice.above,
-            lattice.gain_above,
-            is_shown,
-            extremes,
-        )
+        start, summed_to = number.cumsum() - number, np.zeros(rasters.shape[:2], np.uint64)
+        left_of, above, gain_above = lattice.sums
+        pixels = cls(rasters, owners, start, left_of, summed_to, above, gain_above, is_shown, extremes)
         _fill_above(pixels, lattice.shapes, lattice.strips.box)
         return pixels
 
