@@ -128,12 +128,8 @@ def _covariance(reduced: Floats, parameters: BundleParameters) -> Floats:
 
 def residuals(parameters: BundleParameters, problem: BundleProblem) -> Floats:
     """Residuals of all observations, see `Adjustment`."""
-    return _residuals(
-        parameters.views[problem.correspondences.view],
-        parameters.toe_offset,
-        parameters.points[problem.correspondences.point],
-        problem,
-    )
+    views, points = parameters.views[problem.correspondences.view], parameters.points[problem.correspondences.point]
+    return _residuals(views, parameters.toe_offset, points, problem)
 
 
 def _residuals(views: Floats, toe_offset: Floats, points: Floats, problem: BundleProblem) -> Floats:
@@ -227,7 +223,8 @@ class _System:
 def _system(parameters: BundleParameters, problem: BundleProblem) -> _System:
     correspondences = problem.correspondences
     of_view, of_point = parameters.views[correspondences.view], parameters.points[correspondences.point]
-    residual = _residuals(of_view, parameters.toe_offset, of_point, problem)
+    toe = parameters.toe_offset
+    residual = _residuals(of_view, toe, of_point, problem)
     ahead: Flags = np.asarray(np.isfinite(residual).all(axis=(1, 2)))
     weight = np.where(ahead[:, None], (1.0 + _squares(residual, problem) / _OUTLIER_RESIDUAL**2) ** -2, 0.0)
     root = (np.sqrt(weight / problem.redundancy)[..., None] / problem.spread).reshape(-1, 4)
@@ -236,15 +233,9 @@ def _system(parameters: BundleParameters, problem: BundleProblem) -> _System:
         changed = (_residuals(views, toe_offset, points, problem) - residual).reshape(-1, 4) / step
         return np.where(np.isfinite(changed), changed, 0.0) * root
 
-    by_view = np.stack(
-        [slope(of_view + h * _unit(k, SIZE), parameters.toe_offset, of_point, h) for k, h in enumerate(_STEP_SIZES)], -1
-    )
-    by_toe = np.stack(
-        [slope(of_view, parameters.toe_offset + 1e-4 * _unit(k, 2), of_point, 1e-4) for k in range(2)], -1
-    )
-    by_point = np.stack(
-        [slope(of_view, parameters.toe_offset, of_point + 1e-4 * _unit(k, 3), 1e-4) for k in range(3)], -1
-    )
+    by_view = np.stack([slope(of_view + h * _unit(k, SIZE), toe, of_point, h) for k, h in enumerate(_STEP_SIZES)], -1)
+    by_toe = np.stack([slope(of_view, toe + 1e-4 * _unit(k, 2), of_point, 1e-4) for k in range(2)], -1)
+    by_point = np.stack([slope(of_view, toe, of_point + 1e-4 * _unit(k, 3), 1e-4) for k in range(3)], -1)
     weighted_residual = np.nan_to_num(residual.reshape(-1, 4)) * root
     rows = np.zeros((len(residual), 4, SIZE * len(parameters.views) + len(parameters.toe_offset)))
     columns = SIZE * correspondences.view[:, None] + np.arange(SIZE)

@@ -22,6 +22,8 @@ _HEIGHT_SPREAD = 0.08
 """Standard deviation of body height between people, metres."""
 _HEAD_SPREAD = 0.03
 """Standard deviation of the head height of one walking person, metres."""
+_UNSEEN_OBSERVATIONS, _UNSEEN_POINTS, _HEIGHT_ROUNDS = 20.0, 5.0, 4
+"""Observations of one body's height, or points, that the mean of all is worth; adjustments by heights of points."""
 _MIN_SPREAD = np.array([[0.02, 0.01], [0.004, 0.01]])
 """Least standard deviations of feet and heads, along and across, in body lengths."""
 _MIN_FREEDOM = 0.1
@@ -107,7 +109,16 @@ def refine_cameras(views: CalibrationInput, start: Floats, delay: Ints, progress
                 solution = _at_other_delay(views, solution, later.astype(np.int64), gate, spread)
         delay, parameters, spread = solution.delay, solution.adjustment.parameters, _residual_spread(solution)
         progress()
+    for _ in range(_HEIGHT_ROUNDS):
+        solution = _by_own_heights(views, solution)
     return replace(solution, delay=delay - delay[0])
+
+
+def _by_own_heights(views: CalibrationInput, solution: SolvedViews) -> SolvedViews:
+    """Adjust again by the heights that were found: those by feet alone make people seem larger here than there."""
+    matched, points = solution.problem.correspondences, solution.adjustment.parameters.points
+    problem = replace(solution.problem, height=_shrunk(views, matched, matched.person, points[:, 2], _UNSEEN_POINTS))
+    return replace(solution, problem=problem, adjustment=adjust(solution.adjustment.parameters, problem))
 
 
 def _clock_frames(solution: SolvedViews, views: CalibrationInput) -> Floats:
@@ -154,10 +165,8 @@ def _round(
         same_make(parameters.views, np.array(views.sizes)),
         np.ones(len(matched.view)),
     )
-    points = np.column_stack([matched.ground, height])
-    return SolvedViews(
-        adjust(BundleParameters(parameters.views, parameters.toe_offset, points), problem), problem, delay
-    )
+    start = replace(parameters, points=np.column_stack([matched.ground, height]))
+    return SolvedViews(adjust(start, problem), problem, delay)
 
 
 def refine_with_marks(views: CalibrationInput, solution: SolvedViews, marks: Marks) -> SolvedViews:
@@ -167,15 +176,12 @@ def refine_with_marks(views: CalibrationInput, solution: SolvedViews, marks: Mar
     problem, parameters = solution.problem, solution.adjustment.parameters
     fine = marks.of(even_rows(len(marks), _MAX_MARKS))
     joint = _with_marks(problem, fine)
-    points = np.concatenate(
-        [parameters.points, np.column_stack([fine.ground, np.full(len(fine), views.person_height)])]
-    )
-    adjustment = adjust(replace(parameters, points=points), joint)
+    places = np.column_stack([fine.ground, np.full(len(fine), views.person_height)])
+    adjustment = adjust(replace(parameters, points=np.concatenate([parameters.points, places])), joint)
     people, observations = len(parameters.points), len(problem.correspondences.view)
     parameters = replace(adjustment.parameters, points=adjustment.parameters.points[:people])
-    return SolvedViews(
-        replace(adjustment, parameters=parameters, residual=adjustment.residual[:observations]), problem, solution.delay
-    )
+    adjustment = replace(adjustment, parameters=parameters, residual=adjustment.residual[:observations])
+    return replace(solution, adjustment=adjustment)
 
 
 def _with_marks(problem: BundleProblem, marks: Marks) -> BundleProblem:
@@ -203,21 +209,21 @@ def _with_marks(problem: BundleProblem, marks: Marks) -> BundleProblem:
 
 
 def _heights(views: CalibrationInput, parameters: BundleParameters, matched: Correspondences) -> Floats:
-    """Body height of each point's track, shrunk towards the mean, metres, float64 (n,)."""
-    observations: list[list[float]] = [[] for _ in range(int(matched.person.max(initial=-1)) + 1)]
+    """Body height of each point's track by feet and heads, metres, float64 (n,)."""
+    metres = np.zeros(len(matched.view))
     for view, (size, camera) in enumerate(zip(views.sizes, parameters.views, strict=True)):
-        rows = np.flatnonzero(matched.view == view)
-        heights = height_of_head(camera, size, matched.head[rows], matched.ground[matched.point[rows]])
-        for person, metres in zip(matched.person[matched.point[rows]], heights, strict=True):
-            observations[person].append(metres)
-    mean = np.array([np.nanmedian(several) if np.isfinite(several).any() else np.nan for several in observations])
-    count = np.array([np.isfinite(several).sum() for several in observations])
-    # Shrinkage: with few observations the height stays near the population mean.
-    share = count / (count + 20.0)
-    heights = np.where(np.isfinite(mean), share * mean + (1 - share) * views.person_height, views.person_height)
-    weight = count[matched.person] / np.maximum(np.bincount(matched.person)[matched.person], 1)
-    heights *= views.person_height / np.average(heights[matched.person], weights=np.maximum(weight, 1e-9))
-    return np.asarray(heights[matched.person])
+        rows = matched.view == view
+        metres[rows] = height_of_head(camera, size, matched.head[rows], matched.ground[matched.point[rows]])
+    return _shrunk(views, matched, matched.person[matched.point], metres, _UNSEEN_OBSERVATIONS)
+
+
+def _shrunk(views: CalibrationInput, matched: Correspondences, person: Ints, metres: Floats, unseen: float) -> Floats:
+    """Median height of each point's track, by half towards the mean of all where it is seen as often as `unseen`."""
+    several = [metres[(person == k) & np.isfinite(metres)] for k in range(int(person.max(initial=-1)) + 1)]
+    share = np.array([len(one) / (len(one) + unseen) for one in several])
+    median = np.array([np.median(one) if len(one) else views.person_height for one in several])
+    height = (share * median + (1 - share) * views.person_height)[matched.person]
+    return np.asarray(height * views.person_height / height.mean())
 
 
 def _redundancy(matched: Correspondences, views: CalibrationInput) -> float:
