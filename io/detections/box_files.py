@@ -143,7 +143,8 @@ def _split(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]]]:
         return
     reader = csv.reader(rest, skipinitialspace=True)
     try:
-        yield from ((skipped + reader.line_num, row) for row in reader if any(map(str.strip, row)))
+        begun = iter(lambda: skipped + reader.line_num + 1, None)  # a quoted cell may go on in later lines
+        yield from ((line, row) for line, row in zip(begun, reader, strict=False) if any(map(str.strip, row)))
     except csv.Error as error:
         raise FormatError(path, f"line {skipped + reader.line_num}", error, "fields between commas") from error
 
