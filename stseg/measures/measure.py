@@ -34,7 +34,7 @@ class Measures:
     field: Rows
 
     def __repr__(self) -> str:
-        return f"Measures({', '.join(f'{name}: {len(rows)} rows' for name, rows in self.tables().items())})"
+        return f"Measures(rows of {', '.join(f'{name}: {len(rows)}' for name, rows in self.tables().items())})"
 
     def tables(self) -> dict[str, Rows]:
         """The tables by name."""

@@ -138,7 +138,7 @@ class Run:
         Parameters
         ----------
         output
-            The MP4 file.
+            The WebM or MP4 file, by its ending.
         frames
             (first, stop), half open; None for all.
         camera_images
@@ -244,8 +244,8 @@ class Run:
         Parameters
         ----------
         table
-            trajectory, tracks, boxes, events, ghosts, windows, rates, shifts or timings. Texts are strings; the
-            evidence of each view for a candidate is one column a view, `parts_CAMERA`.
+            trajectory, tracks, boxes, events, ghosts, windows, rates, shifts, timings or another of the file's. Texts
+            are strings; the evidence of each view for a candidate is one column a view, `parts_CAMERA`.
 
         Raises
         ------
