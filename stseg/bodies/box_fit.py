@@ -6,10 +6,12 @@ differ from detector to detector, and are learned (`stseg.noise.box_noise_estima
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
+from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable, box_of, fill_discs, fill_levels
 from stseg.kernels.accelerate import kernel, part
 
 MIDDLE_OFFSET, WIDTH_OFFSET, UPPER_EDGE, LOWER_EDGE_BELOW, LOWER_EDGE_ABOVE = range(5)
@@ -24,10 +26,32 @@ MATCH_LIMIT = 4.5
 """Offsets of the middle beyond this many tolerances exclude a match."""
 LEAST_PIXEL_HEIGHT = 8.0
 """Shares are taken of at least this height, pixels."""
+Edges = Floats | tuple[float, float, float, float]
+"""left, top, right, bottom, pixels."""
+
+
+class ViewBoxes(NamedTuple):
+    """Boxes of one view.
+
+    Attributes
+    ----------
+    edges : float64 (box, 4)
+        left, top, right, bottom, pixels, within the image.
+    tolerance : float64 (box, 5), belief : float64 (box,)
+        Of each box; see `half_square` and `BoxNoise`.
+    width, height
+        Size of the image, pixels.
+    """
+
+    edges: Floats
+    tolerance: Floats
+    belief: Floats
+    width: float
+    height: float
 
 
 @part
-def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, height: float) -> float:
+def half_square(body: Edges, box: Floats, tolerance: Floats, width: float, height: float) -> float:
     """Half the squared Mahalanobis distance of a box from a pillar's box, both left, top, right, bottom in pixels.
 
     `tolerance` float64 (5,) holds standard deviations, shares of the body's height in the image and its grain.
@@ -59,7 +83,7 @@ def fill_offsets(bodies: Floats, boxes: Floats, width: float, height: float, off
 
 
 @part
-def _offsets(body: Floats, box: Floats, width: float, height: float) -> tuple[float, float, float, float]:
+def _offsets(body: Edges, box: Floats, width: float, height: float) -> tuple[float, float, float, float]:
     left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
     top, bottom = min(max(body[1], 0.0), height - 1.0), min(max(body[3], 0.0), height - 1.0)
     if right <= left or bottom <= top:
@@ -86,15 +110,23 @@ def fill_match(
 
 
 @kernel
-def fill_own_match(
-    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, match: Floats
+def add_own_fits(
+    table: BodyTable, patch: Floats, heights: Floats, box: Ints, boxes: ViewBoxes, least: float, score: Floats
 ) -> None:
-    """Fill match (n, pillar): log-likelihood of each box (n, 4) given each of its own pillars' boxes (n, pillar, 4)."""
-    for j in range(len(boxes)):
-        for i in range(bodies.shape[1]):
-            match[j, i] = -np.inf
-            if not np.isnan(bodies[j, i, 0]):
-                match[j, i] = belief[j] - half_square(bodies[j, i], boxes[j], tolerance[j], width, height)
+    """Add to score (person, height, place) the log-likelihood of a person's box given the pillars of a patch, nats.
+
+    `patch` float64 (person, place, 2) and `heights` float64 (person, height) are in metres; `box` int64 (person,) is
+    the box of each, -1 for none: nothing is added. A fit counts as `least` at least.
+    """
+    levels, discs = np.empty((len(LEVELS), 6)), np.empty((len(PROFILE), 6))
+    for j in range(len(box)):
+        for place in range(patch.shape[1] if box[j] >= 0 else 0):
+            fill_levels(table, patch[j, place, 0], patch[j, place, 1], levels)
+            for k in range(heights.shape[1]):
+                fill_discs(levels, heights[j, k], PROFILE, table.step, discs)
+                body, b = box_of(discs, table.breadth), box[j]
+                fit = boxes.belief[b] - half_square(body, boxes.edges[b], boxes.tolerance[b], boxes.width, boxes.height)
+                score[j, k, place] += max(fit, least) if not np.isnan(body[0]) else least
 
 
 @kernel

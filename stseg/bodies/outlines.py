@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints, Shorts, Singles
-from stseg.bodies.pillars import SILHOUETTE, BodyTable, fill_discs
+from stseg.bodies.pillars import LEVELS, SILHOUETTE, BodyTable, fill_discs, fill_levels
 from stseg.kernels.accelerate import kernel, part
 
 # Innermost loops have unsigned places: whether one is negative, and counts from the end, is not asked there.
@@ -114,11 +114,11 @@ def _fill_sums(
     sums, area = result[0], result[1]
     discs, drawn = np.empty((len(SILHOUETTE), 6)), np.empty((pillar_count, len(SILHOUETTE), 6))
     low, high, left_of = np.empty(rows), np.empty(rows), np.empty(rows * (columns + 1))
+    levels = np.empty((len(LEVELS), 6))
     for j in range(people):
         for i in range(pillar_count):
-            x = (pillars.ground[j, i, 0] - table.origin[0]) / table.step
-            y = (pillars.ground[j, i, 1] - table.origin[1]) / table.step
-            fill_discs(table, x, y, pillars.height[j, i], SILHOUETTE, discs)
+            fill_levels(table, pillars.ground[j, i, 0], pillars.ground[j, i, 1], levels)
+            fill_discs(levels, pillars.height[j, i], SILHOUETTE, table.step, discs)
             if _seen(discs):
                 area[j, i] = _fill_drawn(discs, step, pillars.width[j, i], drawn[i])
         window = _window(drawn, area[j], rows, columns)
@@ -141,11 +141,10 @@ def _fill_outlines(
     area: Floats,
 ) -> None:
     rows, (discs, drawn) = spans.shape[1], np.empty((2, len(SILHOUETTE), 6))
-    low, high = np.empty(rows), np.empty(rows)
+    low, high, levels = np.empty(rows), np.empty(rows), np.empty((len(LEVELS), 6))
     for i in range(len(first)):
-        x = (pillars.ground[i, 0] - table.origin[0]) / table.step
-        y = (pillars.ground[i, 1] - table.origin[1]) / table.step
-        fill_discs(table, x, y, pillars.height[i], SILHOUETTE, discs)
+        fill_levels(table, pillars.ground[i, 0], pillars.ground[i, 1], levels)
+        fill_discs(levels, pillars.height[i], SILHOUETTE, table.step, discs)
         if _seen(discs):
             area[i] = _fill_drawn(discs, raster_step, pillars.width[i], drawn)
             top, bottom = _draw(drawn, low, high)

@@ -19,6 +19,7 @@ from stseg.bodies.box_fit import (
     MATCH_LIMIT,
     MIDDLE_OFFSET,
     UPPER_EDGE,
+    ViewBoxes,
     half_square,
 )
 from stseg.kernels.accelerate import kernel, part
@@ -65,26 +66,6 @@ class PillarIndex(NamedTuple):
         tallest = np.maximum.reduceat(tall[order], starts) if len(order) else np.zeros(0)
         start = np.append(starts, len(order)).astype(np.int64)
         return cls(order.astype(np.int32), middle[order], top[order], bottom[order], start, tallest)
-
-
-class ViewBoxes(NamedTuple):
-    """Boxes of one view.
-
-    Attributes
-    ----------
-    edges : float64 (box, 4)
-        left, top, right, bottom, pixels, within the image.
-    tolerance : float64 (box, 5), belief : float64 (box,)
-        See `stseg.bodies.box_fit`.
-    width, height
-        Size of the image, pixels.
-    """
-
-    edges: Floats
-    tolerance: Floats
-    belief: Floats
-    width: float
-    height: float
 
 
 @part

@@ -15,7 +15,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.geometry.camera import Camera
 from stseg.geometry.grid import Grid
-from stseg.kernels.accelerate import kernel
+from stseg.kernels.accelerate import kernel, part
 
 LEVELS = np.linspace(0.0, 2.2, 12)
 """Heights at which the lattice is projected, metres."""
@@ -88,47 +88,65 @@ class BodyTable(NamedTuple):
 
 
 @kernel
-def fill_discs(
-    table: BodyTable, lattice_x: float, lattice_y: float, height: float, profile: Floats, filled: Floats
-) -> None:
-    """Fill filled (disc, 6) with each disc's centre u, v and its Jacobian times radius, pixels."""
-    pixel, step = table.pixel, table.step
-    rows, columns, levels, _ = pixel.shape
+def fill_levels(table: BodyTable, x: float, y: float, levels: Floats) -> None:
+    """Fill levels (level, 6) with the pixel u, v of a ground point, metres, at each level, and its Jacobian.
+
+    The Jacobian is that of u, then of v, in pixels for each step of the lattice.
+    """
+    pixel = table.pixel
+    rows, columns, count, _ = pixel.shape
+    lattice_x, lattice_y = (x - table.origin[0]) / table.step, (y - table.origin[1]) / table.step
     column = min(max(int(np.floor(lattice_x)), 0), columns - 2)
     row = min(max(int(np.floor(lattice_y)), 0), rows - 2)
     a, b = lattice_x - column, lattice_y - row
     here, right, below = np.uint64(column), np.uint64(column + 1), np.uint64(row + 1)
     first, second = pixel[np.uint64(row), here], pixel[np.uint64(row), right]
     third, fourth = pixel[below, here], pixel[below, right]
+    for level in range(np.uint64(count)):
+        for axis in range(np.uint64(2)):
+            upper_slope = second[level, axis] - float(first[level, axis])
+            lower_slope = fourth[level, axis] - float(third[level, axis])
+            upper, lower = first[level, axis] + upper_slope * a, third[level, axis] + lower_slope * a
+            levels[level, axis] = upper + (lower - upper) * b
+            levels[level, 2 + 2 * axis] = upper_slope + (lower_slope - upper_slope) * b
+            levels[level, 3 + 2 * axis] = lower - upper
+
+
+@kernel
+def fill_discs(levels: Floats, height: float, profile: Floats, step: float, discs: Floats) -> None:
+    """Fill discs (disc, 6) with the centre u, v of each disc of a body, and its Jacobian times the radius, pixels.
+
+    `levels` float64 (level, 6) are those of the body's place on a lattice of a step, metres.
+    """
     for k in range(np.uint64(len(profile))):
         z = profile[k, 0] * height / _LEVEL_STEP
-        level = min(max(int(np.floor(z)), 0), levels - 2)
+        level = min(max(int(np.floor(z)), 0), len(levels) - 2)
         c, radius, low, high = z - level, profile[k, 1] / step, np.uint64(level), np.uint64(level + 1)
-        for axis in range(np.uint64(2)):
-            p00 = first[low, axis] * (1 - c) + first[high, axis] * c
-            p01 = second[low, axis] * (1 - c) + second[high, axis] * c
-            p10 = third[low, axis] * (1 - c) + third[high, axis] * c
-            p11 = fourth[low, axis] * (1 - c) + fourth[high, axis] * c
-            filled[k, axis] = (p00 * (1 - a) + p01 * a) * (1 - b) + (p10 * (1 - a) + p11 * a) * b
-            filled[k, 2 + 2 * axis] = ((p01 - p00) * (1 - b) + (p11 - p10) * b) * radius
-            filled[k, 3 + 2 * axis] = ((p10 - p00) * (1 - a) + (p11 - p01) * a) * radius
+        for m in range(np.uint64(6)):
+            value = levels[low, m] + (levels[high, m] - levels[low, m]) * c
+            discs[k, m] = value if m < np.uint64(2) else value * radius
+
+
+@part
+def box_of(discs: Floats, breadth: float) -> tuple[float, float, float, float]:
+    """Left, top, right and bottom of a body's discs (disc, 6), pixels; nan where the view cannot see all of them."""
+    left, top, right, bottom, seen = np.inf, np.inf, -np.inf, -np.inf, 0.0
+    for k in range(len(discs)):
+        wide = breadth * math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
+        tall = breadth * math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
+        left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
+        top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
+        seen += wide + tall
+    return (np.nan, np.nan, np.nan, np.nan) if np.isnan(seen) else (left, top, right, bottom)
 
 
 @kernel
 def _fill_boxes(table: BodyTable, ground: Floats, heights: Floats, filled: Floats) -> None:
-    discs, origin, step = np.empty((len(PROFILE), 6)), table.origin, table.step
+    levels, discs = np.empty((len(LEVELS), 6)), np.empty((len(PROFILE), 6))
     for i in range(len(ground)):
-        x, y = (ground[i, 0] - origin[0]) / step, (ground[i, 1] - origin[1]) / step
-        fill_discs(table, x, y, heights[i], PROFILE, discs)
-        left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
-        visible = True
-        for k in range(len(PROFILE)):
-            wide = table.breadth * math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
-            tall = table.breadth * math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
-            visible = visible and not np.isnan(wide + tall)
-            left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
-            top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
-        filled[i] = (left, top, right, bottom) if visible else (np.nan, np.nan, np.nan, np.nan)
+        fill_levels(table, ground[i, 0], ground[i, 1], levels)
+        fill_discs(levels, heights[i], PROFILE, table.step, discs)
+        filled[i] = box_of(discs, table.breadth)
 
 
 def inside_bodies(grid: Grid, near_person: Ints, ground: Floats, height: Floats) -> Flags:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Shorts, Singles
-from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, fill_inside
+from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, ViewBoxes, fill_inside
 from stseg.bodies.outlines import Pillars, Spans, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import WIDTH, BodyTable
@@ -167,6 +167,11 @@ class BoxView(View):
         corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
         return ViewObservation(edges, boxes.score, *noise.of(boxes.score), np.zeros((0, 0), np.float32))
+
+    def boxes(self, observation: ViewObservation) -> ViewBoxes:
+        """The frame's boxes, as kernels read them."""
+        width, height = map(float, self.camera.size)
+        return ViewBoxes(observation.edges, observation.tolerance, observation.belief, width, height)
 
     def foreground(self, observation: ViewObservation) -> Flags:
         """Raster pixels inside any box, bool (v, u)."""

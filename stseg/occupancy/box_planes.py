@@ -18,8 +18,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
-from stseg.bodies.box_fit import half_square
-from stseg.bodies.pillar_index import PillarIndex, ViewBoxes, fill_fits
+from stseg.bodies.box_fit import ViewBoxes, half_square
+from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.kernels.accelerate import kernel, part
 from stseg.occupancy.fusion import ErrorRates

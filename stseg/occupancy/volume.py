@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
-from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise
+from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, ViewBoxes
 from stseg.bodies.box_likelihood import box_likelihood
-from stseg.bodies.pillar_index import PillarIndex, ViewBoxes
+from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable, inside_bodies
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Rig

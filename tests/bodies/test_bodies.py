@@ -8,7 +8,7 @@ from scenes import body_box, looking, people, ring
 
 from stseg.arrays import Floats
 from stseg.bodies.outlines import outlines
-from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable, fill_discs
+from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable, fill_discs, fill_levels
 from stseg.geometry import Camera, Grid
 
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
@@ -47,9 +47,9 @@ def test_broad_and_tall_bodies_have_larger_boxes() -> None:
 
 @drawn(100, x=numbers(-2, 2), y=numbers(-2, 2), height=numbers(1.3, 2.0))
 def test_discs_are_rings_of_the_body(x: float, y: float, height: float) -> None:
-    table, discs = TABLES["ideal"], np.empty((len(PROFILE), 6))
-    column, row = (np.array([x, y]) - table.origin) / table.step
-    fill_discs(table, column, row, height, PROFILE, discs)
+    table, levels, discs = TABLES["ideal"], np.empty((len(LEVELS), 6)), np.empty((len(PROFILE), 6))
+    fill_levels(table, x, y, levels)
+    fill_discs(levels, height, PROFILE, table.step, discs)
     for (share, radius), disc in zip(PROFILE, discs, strict=True):
         points = ring(np.array([x, y, height]), share, radius, points=64)
         pixel, _ = VIEWS["ideal"].project(points[:, :2], points[:, 2])

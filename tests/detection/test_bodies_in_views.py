@@ -14,9 +14,9 @@ from scenes import BODY, FEW_HEIGHTS, corner_cameras, likelihoods, looking, peop
 
 import stseg
 from stseg.arrays import Flags, Floats, Singles
-from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, fill_inside, fill_match, half_square
+from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, ViewBoxes, fill_inside, fill_match, half_square
 from stseg.bodies.outlines import Pillars, outlines, sums_inside
-from stseg.bodies.pillar_index import PillarIndex, ViewBoxes, fill_fits
+from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable
 from stseg.bodies.views import PixelView, ViewObservation
 from stseg.commands.simulate import simulate

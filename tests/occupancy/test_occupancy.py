@@ -13,8 +13,8 @@ from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, detector_of, eviden
 from strategies import rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
-from stseg.bodies.box_fit import TOLERANCE
-from stseg.bodies.pillar_index import PillarIndex, ViewBoxes
+from stseg.bodies.box_fit import TOLERANCE, ViewBoxes
+from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable
 from stseg.config import OccupancyConfig
 from stseg.geometry import Grid, Rig

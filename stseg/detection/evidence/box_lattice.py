@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels
-from stseg.bodies.pillar_index import ViewBoxes, fill_fits
+from stseg.bodies.pillar_index import fill_fits
 from stseg.bodies.views import BoxView, ViewObservation
 from stseg.kernels.accelerate import kernel
 
@@ -50,8 +50,7 @@ class BoxLattice:
         view, observation = self._views[number]
         index, least = view.index, -view.config.box_log_ratio - _EXPECTED_MISSING_COST
         pillar, fit = np.empty(len(index.order), np.int32), np.empty(len(index.order))
-        boxes = ViewBoxes(observation.edges, observation.tolerance, observation.belief, *map(float, view.camera.size))
-        found = fill_fits(index, view.bodies.reshape(-1, 4), boxes, box, least, pillar, fit)
+        found = fill_fits(index, view.bodies.reshape(-1, 4), view.boxes(observation), box, least, pillar, fit)
         return pillar[:found].copy(), fit[:found].copy()
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Shorts
-from stseg.bodies.box_fit import fill_own_match
+from stseg.bodies.box_fit import add_own_fits
 from stseg.bodies.views import BoxView, PixelView, TriedPillars, View, ViewObservation
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.records.candidates import Candidates
@@ -101,7 +101,7 @@ def refine_places(
     pillars = views[0].tried(patch, heights, widths)
     for k, (view, observation) in enumerate(zip(views, evidence.observations, strict=True)):
         if isinstance(view, PixelView) and observation is not None and len(pool):
-            score += _patch_score(view, observation, assignment, k, pillars)
+            score += _pixel_score(view, observation, assignment, k, pillars)
     tracked = np.flatnonzero(track_index >= 0)
     score[tracked] += evidence.prior.predicted.place_log_density(track_index[tracked], patch[tracked])
     weight = np.exp(score - score.max(1, keepdims=True))
@@ -125,11 +125,18 @@ def _cached_scores(
 
 def _scores(pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, heights: Floats) -> Floats:
     """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
+    patch = pool.ground[:, None] + _PATCH
     score = np.repeat(evidence.prior.log_height(heights)[..., None], len(_PATCH), 2)
-    pillars = _pillars(evidence.views[0], pool.ground[:, None] + _PATCH, heights, pool.width)
-    for k, (view, observation) in enumerate(zip(evidence.views, evidence.observations, strict=True)):
-        if observation is not None and len(pool):
-            score += _patch_score(view, observation, assignment, k, pillars).reshape(score.shape)
+    views = list(enumerate(zip(evidence.views, evidence.observations, strict=True)))
+    for k, (view, observation) in views:
+        if isinstance(view, BoxView) and observation is not None:
+            boxes, least = view.boxes(observation), _MINIMUM_BOX_LOG_LIKELIHOOD
+            add_own_fits(view.table, patch, heights, assignment.box[k], boxes, least, score)
+    if len(evidence.rasters) and len(pool):
+        pillars = _pillars(evidence.views[0], patch, heights, pool.width)
+        for k, (view, observation) in views:
+            if isinstance(view, PixelView) and observation is not None:
+                score += _pixel_score(view, observation, assignment, k, pillars).reshape(score.shape)
     return score
 
 
@@ -157,26 +164,9 @@ def _pillars(view: View, patch: Floats, heights: Floats, width: Floats) -> Tried
     return view.tried(np.tile(patch, (1, heights.shape[1], 1)), tall, np.repeat(width[:, None], tall.shape[1], 1))
 
 
-def _patch_score(
-    view: View, observation: ViewObservation, assignment: EvidenceAssignment, k: int, pillars: TriedPillars
+def _pixel_score(
+    view: PixelView, observation: ViewObservation, assignment: EvidenceAssignment, k: int, pillars: TriedPillars
 ) -> Floats:
     """Log-likelihood of pillars in view k, nats, float64 (person, pillar)."""
-    if isinstance(view, PixelView):
-        sums, area = view.open_sums(observation.raster, assignment.pixels[k], assignment.number, pillars)
-        return np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
-    score = np.zeros_like(pillars.height)
-    columns, rows = map(float, view.camera.size)
-    people = np.flatnonzero(assignment.box[k] >= 0)
-    bodies = view.table.boxes_of(pillars.ground[people].reshape(-1, 2), pillars.height[people].reshape(-1))
-    match, box = np.empty((len(people), score.shape[1])), assignment.box[k, people]
-    fill_own_match(
-        bodies.reshape(*match.shape, 4),
-        observation.edges[box],
-        observation.tolerance[box],
-        observation.belief[box],
-        columns,
-        rows,
-        match,
-    )
-    score[people] = np.maximum(match, _MINIMUM_BOX_LOG_LIKELIHOOD)
-    return score
+    sums, area = view.open_sums(observation.raster, assignment.pixels[k], assignment.number, pillars)
+    return np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
