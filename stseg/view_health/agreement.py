@@ -7,10 +7,10 @@ own frame (none of 27 views warns: by this, fewer than 11 in 100 do, 95 %); of e
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.geometry import Camera
-from stseg.geometry.distances import distances
 
 _RADIUS = 0.75
 """Distance within which feet of two views meet, metres."""
@@ -72,26 +72,19 @@ def _is_stranger(index: int, visible: Flags, view: Ints, frame: Ints, ground: Fl
         return False
     first, length = int(frame[0]), int(frame[-1] - frame[0]) + 1
     lags = [int(length * part) for part in _LAGS]
+    own, others = (cKDTree(_apart(frame[of], ground[of])) for of in (view == index, view != index))
 
-    def share(lag: int, partners: Flags) -> float:
-        return _share_met(frame[chosen], ground[chosen], lag, (first, length), frame[partners], ground[partners])
+    def share(lag: int, partners: cKDTree) -> float:
+        later = first + (frame[chosen] - first + lag) % length  # the recording begins anew at its end
+        away, _ = partners.query(_apart(later, ground[chosen]), distance_upper_bound=_RADIUS)
+        return float(np.mean(away < _RADIUS))
 
-    if np.mean([share(lag, view == index) for lag in lags]) > _STANDING:
+    if np.mean([share(lag, own) for lag in lags]) > _STANDING:
         return False
-    chance = np.mean([share(lag, view != index) for lag in lags])
-    return bool(share(0, view != index) - chance < _AGREEMENT * (1 - chance))
+    chance = np.mean([share(lag, others) for lag in lags])
+    return bool(share(0, others) - chance < _AGREEMENT * (1 - chance))
 
 
-def _share_met(
-    frame: Ints, ground: Floats, lag: int, span: tuple[int, int], others_frame: Ints, others_ground: Floats
-) -> float:
-    """Share of feet with one of others' within the radius, `lag` frames later in a recording that begins anew."""
-    later = span[0] + (frame - span[0] + lag) % span[1]
-    starts, stops = np.searchsorted(others_frame, later), np.searchsorted(others_frame, later, side="right")
-    begins = np.flatnonzero(np.diff(frame, prepend=frame[0] - 1))
-    met = 0
-    for begin, end in zip(begins, [*begins[1:], len(frame)], strict=True):
-        others = others_ground[starts[begin] : stops[begin]]
-        if len(others):
-            met += int((distances(ground[begin:end], others).min(axis=1) < _RADIUS).sum())
-    return met / len(frame)
+def _apart(frame: Ints, ground: Floats) -> Floats:
+    """Places (n, 3) of which those of two frames are farther from each other than feet meet, metres."""
+    return np.column_stack([frame * 2 * _RADIUS, ground])
