@@ -117,7 +117,9 @@ def _fill_sums(
     levels = np.empty((len(LEVELS), 6))
     for j in range(people):
         for i in range(pillar_count):
-            fill_levels(table, pillars.ground[j, i, 0], pillars.ground[j, i, 1], levels)
+            x, y = pillars.ground[j, i]
+            if i == 0 or x != pillars.ground[j, i - 1, 0] or y != pillars.ground[j, i - 1, 1]:
+                fill_levels(table, x, y, levels)
             fill_discs(levels, pillars.height[j, i], SILHOUETTE, table.step, discs)
             if _seen(discs):
                 area[j, i] = _fill_drawn(discs, step, pillars.width[j, i], drawn[i])

@@ -28,8 +28,8 @@ class BoxLattice:
         self._views, self._prior, self._without = views, prior, prior.copy()
         self._fits = {number: dict[int, tuple[Labels, Floats]]() for number in views}
         self._best = {number: np.full(len(prior), -np.inf) for number in views}
-        for number, (view, _) in views.items():
-            _add_scores(np.arange(len(prior)), self._best[number], view.found, view.config.box_log_ratio, self._without)
+        for view, _ in views.values():
+            self._without -= _EXPECTED_MISSING_COST * view.found
 
     def score(self, assigned: Sequence[Ints]) -> Floats:
         """Score of each pillar by the boxes that are free, -1 in the assigned (box,) of their view: nats."""

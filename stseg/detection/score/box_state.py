@@ -38,6 +38,10 @@ class BoxState(NamedTuple):
     """Boxes that a candidate may gain by, with the gain against no box at no cost, nats."""
     fitting: RaggedArray
     """The candidates of each box."""
+    fitting_members: Ints
+    """int64 (k,): the members of the set among the candidates of each box, rising, from the place of the first on."""
+    members: Ints
+    """int64 (view * box,): number of these of each box."""
     hidden: RaggedArray
     """Candidates that one hides in part, with the share that is left."""
     hiders: RaggedArray
@@ -90,6 +94,8 @@ def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
         boxes,
         fits,
         fitting,
+        np.empty(len(fitting.item), np.int64),
+        np.zeros(views * boxes, np.int64),
         _hidden_by(evidence.hiders, views, candidates),
         evidence.hiders,
         evidence.inside.copy().reshape(-1),
@@ -113,6 +119,37 @@ def _hidden_by(hiders: RaggedArray, views: int, candidates: int) -> RaggedArray:
             for k in range(hiders.start[view * candidates + i], hiders.start[view * candidates + i + 1]):
                 append(hidden, place, view * candidates + hiders.item[k], i, hiders.value[k])
     return hidden
+
+
+@part
+def join_boxes(i: int, state: BoxState) -> None:
+    """Put candidate i among the members of its boxes."""
+    listed = state.fitting_members
+    for view in range(state.views):
+        row = view * len(state.is_linked) + i
+        for k in range(state.fits.start[row], state.fits.start[row + 1]):
+            box = view * state.boxes + state.fits.item[k]
+            first, place = state.fitting.start[box], state.fitting.start[box] + state.members[box]
+            while place > first and listed[place - 1] > i:
+                listed[place] = listed[place - 1]
+                place -= 1
+            listed[place] = i
+            state.members[box] += 1
+
+
+@part
+def leave_boxes(i: int, state: BoxState) -> None:
+    """Take candidate i from the members of its boxes."""
+    listed = state.fitting_members
+    for view in range(state.views):
+        row = view * len(state.is_linked) + i
+        for k in range(state.fits.start[row], state.fits.start[row + 1]):
+            box = view * state.boxes + state.fits.item[k]
+            first = kept = state.fitting.start[box]
+            for place in range(first, first + state.members[box]):
+                listed[kept] = listed[place]
+                kept += listed[kept] != i
+            state.members[box] -= 1
 
 
 @part
@@ -165,8 +202,8 @@ def link(view: int, i: int, inside: Flags, state: BoxState) -> int:
         done += 1
         for k in range(fits.start[row], fits.start[row + 1]):
             box = view * state.boxes + fits.item[k]
-            for m in range(fitting.start[box], fitting.start[box + 1]):
-                j = fitting.item[m]
+            for m in range(fitting.start[box], fitting.start[box] + state.members[box]):
+                j = state.fitting_members[m]
                 if inside[j] and not is_linked[j]:
                     linked[number], is_linked[j] = j, True
                     number += 1
