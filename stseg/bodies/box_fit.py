@@ -98,15 +98,14 @@ def _offsets(body: Edges, box: Floats, width: float, height: float) -> tuple[flo
 
 
 @kernel
-def fill_match(
-    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, match: Floats
-) -> None:
-    """Fill match (candidate, box): log-likelihood of each box (n, 4) given each pillar's box (candidate, 4)."""
+def fill_match(bodies: Floats, boxes: ViewBoxes, match: Floats) -> None:
+    """Fill match (candidate, box): log-likelihood of each box given each pillar's box (candidate, 4)."""
     for i in range(len(bodies)):
-        for b in range(len(boxes)):
+        for b in range(len(boxes.edges)):
             match[i, b] = -np.inf
             if not np.isnan(bodies[i, 0]):
-                match[i, b] = belief[b] - half_square(bodies[i], boxes[b], tolerance[b], width, height)
+                square = half_square(bodies[i], boxes.edges[b], boxes.tolerance[b], boxes.width, boxes.height)
+                match[i, b] = boxes.belief[b] - square
 
 
 @kernel

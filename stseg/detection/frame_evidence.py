@@ -51,8 +51,8 @@ class FrameEvidence:
         return BoxLattice(views, np.repeat(prior, self.views[0].bodies.shape[1]))
 
     @cached_property
-    def patch_scores(self) -> dict[bytes, Floats]:
-        """Scores of places, by place and boxes, that `stseg.detection.search.refine` has computed in this frame."""
+    def box_scores(self) -> dict[bytes, Floats]:
+        """Scores of people's patches by their boxes, as `stseg.detection.search.refine` found them in this frame."""
         return {}
 
     @cached_property

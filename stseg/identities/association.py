@@ -97,9 +97,8 @@ class IdentityProblem:
         `identity` and `frame` int64 (n,) are those of each row, identity 0 for none; `earlier` KNOWN_PERSON (k,) are
         the people of earlier recordings.
         """
-        order = self.observations.order
-        precision, information = self.observations.precision, self.observations.information
-        visits = pooled_visits(identity[order], frame[order], precision, information)
+        order, rows = self.observations.order, self.observations.rows
+        visits = pooled_visits(identity[order], frame[order], rows.precision, rows.information)
         value = np.full((len(earlier), len(self.model.spread)), np.nan)
         number = np.zeros(value.shape)
         value[:, 0], number[:, 0] = earlier["height"], earlier["height_count"]

@@ -14,7 +14,7 @@ from scenes import BODY, FEW_HEIGHTS, corner_cameras, likelihoods, looking, peop
 
 import stseg
 from stseg.arrays import Flags, Floats, Singles
-from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, ViewBoxes, fill_inside, fill_match, half_square
+from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, ViewBoxes, add_own_fits, fill_inside, fill_match, half_square
 from stseg.bodies.outlines import Pillars, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable
@@ -54,10 +54,10 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
     edges = np.array(found).reshape(-1, 4)
     tolerance, belief = PRIOR_NOISE.of(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
     match, best = np.empty((len(bodies), len(edges))), np.full(len(bodies), -np.inf)
-    fill_match(bodies, edges, tolerance, belief, WIDTH, HEIGHT, match)
+    boxes = ViewBoxes(edges, tolerance, belief, WIDTH, HEIGHT)
+    fill_match(bodies, boxes, match)
     index = PillarIndex.of(bodies, (int(WIDTH), int(HEIGHT)))
     pillar, fit = np.empty(len(bodies), np.int32), np.empty(len(bodies))
-    boxes = ViewBoxes(edges, tolerance, belief, WIDTH, HEIGHT)
     for b in range(len(edges)):
         number = fill_fits(index, bodies, boxes, b, -30.0, pillar, fit)
         assert (fit[:number] > -30.0).all()
@@ -70,6 +70,20 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
         np.testing.assert_allclose(match[i], belief - np.array(costs).reshape(-1), rtol=1e-9)
     expected = match.max(1, initial=-np.inf)
     np.testing.assert_array_equal(best, np.where(expected > -30.0, expected, -np.inf))
+
+
+@drawn(50, st.integers(0, 99))
+def test_own_boxes_fit_as_they_match(seed: int) -> None:
+    chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
+    patch, heights = chance.uniform(-4, 4, (3, 2, 2)), chance.uniform(1.4, 2, (3, 4))
+    edges, own, score = table.boxes_of(patch[:2, 0], heights[:2, 0]), np.array([1, -1, 0]), np.ones((3, 4, 2))
+    boxes = ViewBoxes(edges, *PRIOR_NOISE.of(chance.uniform(0.1, 1, 2)), WIDTH, HEIGHT)
+    add_own_fits(table, patch, heights, own, boxes, -8.0, score)
+    for j, k, place in np.ndindex(3, 4, 2):
+        match = np.empty((1, 2))
+        fill_match(table.boxes_of(patch[j, place : place + 1], heights[j, k : k + 1]), boxes, match)
+        expected = 1.0 + max(match[0, own[j]], -8.0) if own[j] >= 0 else 1.0
+        assert score[j, k, place] == pytest.approx(expected, abs=1e-9)
 
 
 @drawn(100, st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.integers(0, 99))
@@ -112,7 +126,7 @@ def test_an_outline_is_the_silhouette(step: int) -> None:
 def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
     chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
     ground, heights = chance.uniform(-3, 3, (2, 3, 2)), chance.uniform(1.4, 2, (2, 3))
-    widths = chance.uniform(0.8, 1.3, (2, 3))
+    widths, ground[:, 1] = chance.uniform(0.8, 1.3, (2, 3)), ground[:, 0]
     shape = (-(-96 // step), -(-128 // step))
     values, owner = chance.normal(size=shape).astype(np.float32), chance.integers(-1, 3, shape, np.int16)
     sums, whole = sums_inside(table, Pillars(ground, heights, widths), step, values, owner, np.arange(2))

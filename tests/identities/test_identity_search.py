@@ -69,7 +69,7 @@ def test_early_names_are_of_one_hypothesis_and_later_ones_count() -> None:
     true["height"][(true["frame"] >= 66) & (true["frame"] < 110)] = np.nan
     true["xx"] = true["yy"] = 0.02
     seen = seen_of(swapped(true, 80))
-    names, apart = found(seen), np.abs(seen.ground[:, 0]) > 0.5
+    names, apart = found(seen), np.abs(seen.rows.ground[:, 0]) > 0.5
     assert len(np.unique([names[apart], true["id"][seen.order][apart]], axis=1).T) == 2
 
 
@@ -77,7 +77,7 @@ def test_early_names_are_of_one_hypothesis_and_later_ones_count() -> None:
 def test_of_hypotheses_with_the_same_people_the_best_is_kept(
     names: list[list[int]], columns: list[int], distinct: int
 ) -> None:
-    seen = seen_of(rows_of({1: (straight(-3, 0, 0.5, 0), 1.7, range(5))})).rows()
+    seen = seen_of(rows_of({1: (straight(-3, 0, 0.5, 0), 1.7, range(5))})).rows
     held, pasts = Hypotheses.empty(2, 2, 0), Pasts.empty(4, 1)
     held.past[:], pasts.name[:], pasts.last[:] = [[0, 1], [2, 3]], np.ravel(names), 0
     change, value = np.array([[h, -1, -1, -1, -1] for h in range(2)]), np.array([2.0, 1.0])

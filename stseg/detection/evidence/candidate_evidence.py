@@ -82,19 +82,11 @@ def box_evidence(
     inside = np.zeros((len(chosen), candidates))
     if base is not None:
         match[:, :first], inside[:, :first] = base.match, base.inside
-    for k, (_, observation) in enumerate(chosen):
+    for k, (view, observation) in enumerate(chosen):
         if observation is not None:
-            edges, (width, height) = bodies.edges[k, first:], sizes[k].tolist()
-            fill_match(
-                edges,
-                observation.edges,
-                observation.tolerance,
-                observation.belief,
-                width,
-                height,
-                match[k, first:, : len(observation.edges)],
-            )
-            fill_inside(edges, width, height, inside[k, first:])
+            edges, of_view = bodies.edges[k, first:], view.boxes(observation)
+            fill_match(edges, of_view, match[k, first:])
+            fill_inside(edges, of_view.width, of_view.height, inside[k, first:])
     is_blind = np.array([observation is None for _, observation in chosen], bool)
     hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, base.hiders if base else no_rows(), first)
     return BoxEvidence(match, boxes, hiders, inside)

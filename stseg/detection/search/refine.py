@@ -12,7 +12,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Shorts
 from stseg.bodies.box_fit import add_own_fits
-from stseg.bodies.views import BoxView, PixelView, TriedPillars, View, ViewObservation
+from stseg.bodies.views import BoxView, PixelView, TriedPillars
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.records.candidates import Candidates
 
@@ -47,7 +47,7 @@ class EvidenceAssignment:
 
     def of(self, chosen: Ints) -> EvidenceAssignment:
         """The assignment to some of the people, int64 (k,)."""
-        return EvidenceAssignment(self.box[:, chosen], self.pixels, self.number[chosen])
+        return EvidenceAssignment(self.box.take(chosen, 1), self.pixels, self.number[chosen])
 
 
 @dataclass(frozen=True)
@@ -71,15 +71,9 @@ def refine_places_and_heights(
 
     `track_index` int64 (n,) is the predicted track that each person continues, -1 for births.
     """
-    views, prior = evidence.views, evidence.prior
-    heights = _tried_heights(pool, evidence)
-    patch = pool.ground[:, None] + _PATCH
-    if all(isinstance(view, BoxView) for view in views) and len(pool):
-        score = _cached_scores(pool, evidence, assignment, heights)
-    else:
-        score = _scores(pool, evidence, assignment, heights)
-    tracked = np.flatnonzero(track_index >= 0)
-    score[tracked] += prior.predicted.place_log_density(track_index[tracked], patch[tracked])[:, None]
+    heights, patch = _tried_heights(pool, evidence), pool.ground[:, None] + _PATCH
+    score, tracked = _scores(pool, evidence, assignment, heights), np.flatnonzero(track_index >= 0)
+    score[tracked] += evidence.prior.predicted.place_log_density(track_index[tracked], patch[tracked])[:, None]
     return _posterior(score, patch, heights)
 
 
@@ -95,13 +89,9 @@ def refine_places(
     pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, track_index: Ints
 ) -> RefinedPlaces:
     """The posterior of each person's place alone, by pixels, at its height in the pool; arguments as above."""
-    patch, views = pool.ground[:, None] + _PATCH, evidence.views
-    score = np.zeros(patch.shape[:2])
+    patch = pool.ground[:, None] + _PATCH
     heights, widths = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))
-    pillars = views[0].tried(patch, heights, widths)
-    for k, (view, observation) in enumerate(zip(views, evidence.observations, strict=True)):
-        if isinstance(view, PixelView) and observation is not None and len(pool):
-            score += _pixel_score(view, observation, assignment, k, pillars)
+    score = _pixel_scores(evidence, assignment, evidence.views[0].tried(patch, heights, widths))
     tracked = np.flatnonzero(track_index >= 0)
     score[tracked] += evidence.prior.predicted.place_log_density(track_index[tracked], patch[tracked])
     weight = np.exp(score - score.max(1, keepdims=True))
@@ -109,34 +99,40 @@ def refine_places(
     return RefinedPlaces(*_moments(weight, patch), pool.height, np.zeros(len(pool)))
 
 
-def _cached_scores(
-    pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, heights: Floats
-) -> Floats:
-    """`_scores` of people in views that all deliver boxes: in a frame many keep their place and their boxes."""
-    cache = evidence.patch_scores
-    starts = zip(pool.ground, heights, assignment.box.T, strict=True)
-    names = [place.tobytes() + tall.tobytes() + box.tobytes() for place, tall, box in starts]
-    uncached = np.array([j for j, name in enumerate(names) if name not in cache], int)
-    if len(uncached):
-        scores = _scores(pool.at(uncached), evidence, assignment.of(uncached), heights[uncached])
-        cache.update(zip((names[j] for j in uncached), scores, strict=True))
-    return np.stack([cache[name] for name in names])
-
-
 def _scores(pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, heights: Floats) -> Floats:
     """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
-    patch = pool.ground[:, None] + _PATCH
     score = np.repeat(evidence.prior.log_height(heights)[..., None], len(_PATCH), 2)
-    views = list(enumerate(zip(evidence.views, evidence.observations, strict=True)))
-    for k, (view, observation) in views:
+    if len(evidence.rasters):
+        patch, tall = pool.ground[:, None] + _PATCH, np.repeat(heights, len(_PATCH), 1)  # places are inner
+        places, widths = np.tile(patch, (1, heights.shape[1], 1)), np.repeat(pool.width[:, None], tall.shape[1], 1)
+        pillars = evidence.views[0].tried(places, tall, widths)
+        score += _pixel_scores(evidence, assignment, pillars).reshape(score.shape)
+    if len(pool) and any(isinstance(view, BoxView) for view in evidence.views):
+        score += _box_scores(pool, evidence, assignment.box, heights)
+    return score
+
+
+def _box_scores(pool: Candidates, evidence: FrameEvidence, box: Ints, heights: Floats) -> Floats:
+    """The same by boxes alone, `box` int64 (view, person): once for all who keep their place and their boxes."""
+    names, known = [row.tobytes() for row in np.column_stack([pool.ground, heights, box.T])], evidence.box_scores
+    new = [j for j, name in enumerate(names) if name not in known]
+    patch, score = pool.ground[new, None] + _PATCH, np.zeros((len(new), heights.shape[1], len(_PATCH)))
+    for view, observation, own in zip(evidence.views, evidence.observations, box, strict=True):
         if isinstance(view, BoxView) and observation is not None:
             boxes, least = view.boxes(observation), _MINIMUM_BOX_LOG_LIKELIHOOD
-            add_own_fits(view.table, patch, heights, assignment.box[k], boxes, least, score)
-    if len(evidence.rasters) and len(pool):
-        pillars = _pillars(evidence.views[0], patch, heights, pool.width)
-        for k, (view, observation) in views:
-            if isinstance(view, PixelView) and observation is not None:
-                score += _pixel_score(view, observation, assignment, k, pillars).reshape(score.shape)
+            add_own_fits(view.table, patch, heights[new], own[new], boxes, least, score)
+    known.update(zip((names[j] for j in new), score, strict=True))
+    return np.stack([known[name] for name in names])
+
+
+def _pixel_scores(evidence: FrameEvidence, assignment: EvidenceAssignment, pillars: TriedPillars) -> Floats:
+    """Log-likelihood of pillars in the views that deliver pixels, nats, float64 (person, pillar)."""
+    score = np.zeros_like(pillars.height)
+    pairs = zip(evidence.views, evidence.observations, assignment.pixels, strict=True)
+    for view, observation, owner in pairs:
+        if isinstance(view, PixelView) and observation is not None and len(score):
+            sums, area = view.open_sums(observation.raster, owner, assignment.number, pillars)
+            score += np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
     return score
 
 
@@ -156,17 +152,3 @@ def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
     offset = patch - ground[:, None]
     covariance = np.matmul((offset * weight[..., None]).transpose(0, 2, 1), offset)
     return ground, covariance + np.eye(2) * _PATCH_SPACING**2 / 12
-
-
-def _pillars(view: View, patch: Floats, heights: Floats, width: Floats) -> TriedPillars:
-    """Pillars (person, height x place) of heights (person, height) and places (person, place, 2); places are inner."""
-    tall = np.repeat(heights, patch.shape[1], 1)
-    return view.tried(np.tile(patch, (1, heights.shape[1], 1)), tall, np.repeat(width[:, None], tall.shape[1], 1))
-
-
-def _pixel_score(
-    view: PixelView, observation: ViewObservation, assignment: EvidenceAssignment, k: int, pillars: TriedPillars
-) -> Floats:
-    """Log-likelihood of pillars in view k, nats, float64 (person, pillar)."""
-    sums, area = view.open_sums(observation.raster, assignment.pixels[k], assignment.number, pillars)
-    return np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)

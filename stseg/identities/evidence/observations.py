@@ -20,29 +20,8 @@ _LEAST_PLACE_ERROR = 0.05
 
 
 class ObservedRows(NamedTuple):
-    """Rows of a run for kernels; all but `sign` as of `Observations`."""
+    """Rows of a run in the order of time, for kernels."""
 
-    ground: Floats
-    variance: Floats
-    previous: Ints
-    certain: Flags
-    inside: Floats
-    precision: Floats
-    information: Floats
-    sign: Ints
-    """int64 (n,): a number for each row, drawn at random, of 62 bits."""
-
-
-@dataclass(frozen=True)
-class Observations:
-    """Rows of a run, frame by frame."""
-
-    order: Ints
-    """int64 (n,): index of each observation in the trajectory."""
-    start: Ints
-    """int64 (frame + 1,): first observation of each frame that has rows."""
-    seconds: Floats
-    """float64 (frame,)."""
     ground: Floats
     """float64 (n, 2): metres."""
     variance: Floats
@@ -57,12 +36,22 @@ class Observations:
     """float64 (n, size): inverse variance of each size."""
     information: Floats
     """float64 (n, size): the precision times the deviation of the size from the population's mean."""
+    sign: Ints
+    """int64 (n,): a number for each row, drawn at random, of 62 bits."""
 
-    def rows(self) -> ObservedRows:
-        """The observations for kernels, with a random number of each row."""
-        drawn = np.random.default_rng(0).integers(1 << 61, size=len(self.order)) * 2 + 1
-        places = self.ground, self.variance, self.previous, self.certain, self.inside
-        return ObservedRows(*places, self.precision, self.information, drawn)
+
+@dataclass(frozen=True)
+class Observations:
+    """Rows of a run, frame by frame."""
+
+    order: Ints
+    """int64 (n,): index of each observation in the trajectory."""
+    start: Ints
+    """int64 (frame + 1,): first observation of each frame that has rows."""
+    seconds: Floats
+    """float64 (frame,)."""
+    rows: ObservedRows
+    """What each says of its person."""
 
     @cached_property
     def number(self) -> Ints:
@@ -82,22 +71,14 @@ class Observations:
         frames, start = np.unique(self._frame[chosen], return_index=True)
         place = np.full(len(self.order) + 1, -1)  # the last is that of no observation
         place[chosen] = np.arange(len(chosen))
-        previous = place[self.previous[chosen]]
-        precision, information = self.precision[chosen], self.information[chosen]
-        np.add.at(precision, place[stand_in], self.precision[left_out])
-        np.add.at(information, place[stand_in], self.information[left_out])
-        return Observations(
-            self.order[chosen],
-            np.append(start, len(chosen)),
-            self.seconds[frames],
-            self.ground[chosen],
-            self.variance[chosen],
-            previous,
-            self.certain[chosen] & (previous >= 0),
-            self.inside[chosen],
-            precision,
-            information,
-        )
+        one, previous = self.rows, place[self.rows.previous[chosen]]
+        precision, information = one.precision[chosen], one.information[chosen]
+        np.add.at(precision, place[stand_in], one.precision[left_out])
+        np.add.at(information, place[stand_in], one.information[left_out])
+        certain, inside, sign = one.certain[chosen] & (previous >= 0), one.inside[chosen], _signs(len(chosen))
+        places = one.ground[chosen], one.variance[chosen], previous, certain, inside
+        rows = ObservedRows(*places, precision, information, sign)
+        return Observations(self.order[chosen], np.append(start, len(chosen)), self.seconds[frames], rows)
 
 
 def observe(
@@ -113,21 +94,16 @@ def observe(
     frames, start = np.unique(rows["frame"], return_index=True)
     ground = np.column_stack([rows["x"], rows["y"]])
     precision, information = model.evidence(sizes[order])
-    previous = _previous(rows)
-    start = np.append(start, len(rows))
-    alike = PLACE_ERROR.row_variance(frame_rate)
-    return Observations(
-        order,
-        start,
-        frames / frame_rate,
-        ground,
-        np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2),
-        previous,
-        _certain(rows, previous),
-        border.inside(ground, config.detection.border_width),
-        precision,
-        information,
-    )
+    previous, alike = _previous(rows), PLACE_ERROR.row_variance(frame_rate)
+    variance = np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2)
+    inside = border.inside(ground, config.detection.border_width)
+    places = ground, variance, previous, _certain(rows, previous), inside
+    observed = ObservedRows(*places, precision, information, _signs(len(rows)))
+    return Observations(order, np.append(start, len(rows)), frames / frame_rate, observed)
+
+
+def _signs(number: int) -> Ints:
+    return np.random.default_rng(0).integers(1 << 61, size=number) * 2 + 1
 
 
 def _previous(rows: Rows) -> Ints:

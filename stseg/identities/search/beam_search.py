@@ -7,7 +7,7 @@ the best K. Names become final after a lag, so memory does not grow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -128,16 +128,16 @@ def search_identities(
     frame = np.repeat(np.arange(len(observations.seconds)), np.diff(observations.start))
     people = ConstrainedPeople.of(constraints, frame)
     # Frames with constraints lose their certain rows: a constraint may overrule them.
-    certain = observations.certain & ~np.isin(frame, people.decided(frame))
-    observations = replace(observations, certain=certain)
+    rows = observations.rows
+    rows = rows._replace(certain=rows.certain & ~np.isin(frame, people.decided(frame)))
     slots = int(np.diff(observations.start).max(initial=0)) + _SPARE + people.most_open()
     most = limits.hypotheses
     hypotheses, spare = (
         (Hypotheses.empty(most, slots, len(people.begin)), Pasts.empty(2 * most * slots, len(sizes.spread)))
         for _ in range(2)
     )
-    rows, named = observations.rows(), people.by_frame(observations.start)
-    beam = Frames(observations.start, observations.seconds), rows, named, _rules(sizes, motion, limits)
+    named, frames = people.by_frame(observations.start), Frames(observations.start, observations.seconds)
+    beam = frames, rows, named, _rules(sizes, motion, limits)
     history, number, size, begin = _History(np.full(len(observations.order), -1)), 1, 0, 0
     while begin < len(observations.seconds):
         since = history.steps[0].seconds if history.steps else observations.seconds[begin]
