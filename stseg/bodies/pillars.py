@@ -130,14 +130,14 @@ def fill_discs(levels: Floats, height: float, profile: Floats, step: float, disc
 @part
 def box_of(discs: Floats, breadth: float) -> tuple[float, float, float, float]:
     """Left, top, right and bottom of a body's discs (disc, 6), pixels; nan where the view cannot see all of them."""
-    left, top, right, bottom, seen = np.inf, np.inf, -np.inf, -np.inf, 0.0
+    left, top, right, bottom, total = np.inf, np.inf, -np.inf, -np.inf, 0.0
     for k in range(len(discs)):
         wide = breadth * math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
         tall = breadth * math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
         left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
         top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
-        seen += wide + tall
-    return (np.nan, np.nan, np.nan, np.nan) if np.isnan(seen) else (left, top, right, bottom)
+        total += wide + tall
+    return (np.nan, np.nan, np.nan, np.nan) if np.isnan(total) else (left, top, right, bottom)
 
 
 @kernel

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Flags, Labels
+from stseg.arrays import Bytes, Flags, Labels
 from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.lattice import Lattice, cells, neighbour, node_values
 from stseg.graphcut.max_flow import Graph, solve
@@ -19,7 +19,7 @@ from stseg.graphcut.sign_sets import LABEL_ONE, LABEL_ZERO, UNDECIDED
 from stseg.kernels.accelerate import kernel, part
 
 GREATEST_CAPACITY = 16383
-"""Quanta: twice as much fits into 16 bits."""
+"""Quanta: the sums of all capacities of a node stay far below what 32 bits hold."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ def _residual_graph(reduced: Reduction) -> Graph:
     size, degree = len(reduced.left), len(reduced.capacity)
     number = np.empty(len(reduced.state), np.int32)
     number[reduced.left] = np.arange(size, dtype=np.int32)
-    head, sister = np.empty((2, size * degree), np.int32)
-    residual, first = np.empty(size * degree, np.int16), np.arange(size + 1, dtype=np.int32) * np.int32(degree)
+    head, sister, residual = np.empty((3, size * degree), np.int32)
+    first = np.arange(size + 1, dtype=np.int32) * np.int32(degree)
     _fill_arcs(reduced.left, reduced.state, reduced.lattice, reduced.capacity, number, head, sister, residual)
     return Graph(residual, reduced.excess.copy(), first, sister, head)
 
@@ -79,7 +79,7 @@ def _fill_arcs(
     number: Labels,
     head: Labels,
     sister: Labels,
-    residual: AnyArray,
+    residual: Labels,
 ) -> None:
     """Fill head, sister and residual of the arcs of the undecided nodes; slots 2 i and 2 i + 1 are opposite."""
     degree = len(capacity)

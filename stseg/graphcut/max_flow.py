@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels
+from stseg.arrays import Bytes, Flags, Ints, Labels
 from stseg.kernels.accelerate import kernel, part
 
 NO_ARC, TERMINAL, ORPHAN = -1, -2, -3
@@ -27,7 +27,7 @@ class Graph(NamedTuple):
 
     Attributes
     ----------
-    residual : int16 or int32 (arc,)
+    residual : int32 (arc,)
         Residual capacities (n-links); the arcs of a node are consecutive.
     excess : int32 (n,)
         Residual capacity of each t-link: from the source (> 0) or to the sink (< 0).
@@ -37,7 +37,7 @@ class Graph(NamedTuple):
         Reverse arc of each arc, and the node at its end.
     """
 
-    residual: AnyArray
+    residual: Labels
     excess: Labels
     first: Labels
     sister: Labels

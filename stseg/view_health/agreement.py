@@ -72,17 +72,17 @@ def _is_stranger(index: int, visible: Flags, view: Ints, frame: Ints, ground: Fl
         return False
     first, length = int(frame[0]), int(frame[-1] - frame[0]) + 1
     lags = [int(length * part) for part in _LAGS]
-    own, others = (cKDTree(_apart(frame[of], ground[of])) for of in (view == index, view != index))
+    own_feet, other_feet = (cKDTree(_apart(frame[of], ground[of])) for of in (view == index, view != index))
 
     def share(lag: int, partners: cKDTree) -> float:
         later = first + (frame[chosen] - first + lag) % length  # the recording begins anew at its end
         away, _ = partners.query(_apart(later, ground[chosen]), distance_upper_bound=_RADIUS)
         return float(np.mean(away < _RADIUS))
 
-    if np.mean([share(lag, own) for lag in lags]) > _STANDING:
+    if np.mean([share(lag, own_feet) for lag in lags]) > _STANDING:
         return False
-    chance = np.mean([share(lag, others) for lag in lags])
-    return bool(share(0, others) - chance < _AGREEMENT * (1 - chance))
+    chance = np.mean([share(lag, other_feet) for lag in lags])
+    return bool(share(0, other_feet) - chance < _AGREEMENT * (1 - chance))
 
 
 def _apart(frame: Ints, ground: Floats) -> Floats:

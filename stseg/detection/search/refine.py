@@ -117,10 +117,10 @@ def _box_scores(pool: Candidates, evidence: FrameEvidence, box: Ints, heights: F
     names, known = [row.tobytes() for row in np.column_stack([pool.ground, heights, box.T])], evidence.box_scores
     new = [j for j, name in enumerate(names) if name not in known]
     patch, score = pool.ground[new, None] + _PATCH, np.zeros((len(new), heights.shape[1], len(_PATCH)))
-    for view, observation, own in zip(evidence.views, evidence.observations, box, strict=True):
+    for view, observation, own_box in zip(evidence.views, evidence.observations, box, strict=True):
         if isinstance(view, BoxView) and observation is not None:
             boxes, least = view.boxes(observation), _MINIMUM_BOX_LOG_LIKELIHOOD
-            add_own_fits(view.table, patch, heights[new], own[new], boxes, least, score)
+            add_own_fits(view.table, patch, heights[new], own_box[new], boxes, least, score)
     known.update(zip((names[j] for j in new), score, strict=True))
     return np.stack([known[name] for name in names])
 

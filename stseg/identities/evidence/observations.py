@@ -51,7 +51,7 @@ class Observations:
     seconds: Floats
     """float64 (frame,)."""
     rows: ObservedRows
-    """What each says of its person."""
+    """Their evidence."""
 
     @cached_property
     def number(self) -> Ints:
