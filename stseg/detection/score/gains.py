@@ -52,13 +52,13 @@ def gain(i: int, absent: int, state: SetState) -> float:
         assign_track(i, state.tracks)
     for view in range(boxes.views):
         row = view * candidates + i
-        if absent >= 0:
-            total += box_gain(view, i, state.inside, boxes, problem.parameters)
+        if absent < 0 and state.is_known[row]:
+            total += state.gains[row]
             continue
-        if not state.is_known[row]:
-            state.gains[row] = box_gain(view, i, state.inside, boxes, problem.parameters)
-            state.is_known[row] = True
-        total += state.gains[row]
+        gained = box_gain(view, i, state.inside, boxes, problem.parameters)
+        if absent < 0:
+            state.gains[row], state.is_known[row] = gained, True
+        total += gained
     state.inside[i] = is_member
     if absent < 0:
         state.gains[whole], state.is_known[whole] = total, True
