@@ -176,7 +176,8 @@ class CellTables:
         block = np.flatnonzero(marked & (self._width > 0)).astype(np.int32)
         start = np.append(0, self._width[block].cumsum()).astype(np.int32)
         in_volume, others = np.empty(start[-1], np.int32), self.sets.size.astype(float)
-        near_person = np.full(len(in_volume) + len(others), -1, np.int32)
+        near_person = np.empty(len(in_volume) + len(others), np.int32)
+        near_person[len(in_volume) :] = -1
         cells = ShownCells(block, start, self._first[block], in_volume, others, near_person)
         _fill_cells(cells, self.in_volume, self.sets.of_cell)
         return cells
@@ -212,7 +213,9 @@ def _fill_near(cells: ShownCells, place: Labels, near_person: Ints) -> None:
     b = 0
     while b < len(cells.block):
         listed, every, b = adjacent_cells(cells, b)
-        cells.near_person[listed] = near_person[place[every]]
+        target, source = cells.near_person[listed], place[every]
+        for k in range(len(target)):
+            target[k] = near_person[source[k]]
 
 
 @kernel
