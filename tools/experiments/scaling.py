@@ -34,7 +34,7 @@ AXES: dict[str, tuple[str, tuple[int, ...]]] = {
 """What is changed, and the values that it takes."""
 KINDS = ("masks", "boxes", "video")
 _USUAL = {"area": 10, "views": 8, "people": 10, "pixels": 320}
-_MOST_VIEWS, _READY, _MEASURED, _EMPTY = 16, 8, 16, 10
+_MOST_VIEWS, _READY, _MEASURED, _EMPTY = 16, 8, 64, 10
 """Views; frames before the clock starts, and while it runs; images from which a background is learned."""
 _STAGES = ("foreground", "detection", "occupancy", "tracking")
 
