@@ -126,7 +126,7 @@ class Driver:
         self._process.stdin.write(json.dumps([fault, at, str(output.parent), str(self._log), arguments, after]) + "\n")
         self._process.stdin.flush()
         status = int(self._process.stdout.readline())
-        calls = json.loads(self._log.read_text()) if self._log.exists() else []
+        calls = json.loads(self._log.read_text()) if status >= 0 and self._log.exists() else []
         return Trial(status, Path(f"{self._log}.err").read_text(), tuple(calls))
 
     def close(self) -> None:

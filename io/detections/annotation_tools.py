@@ -129,6 +129,8 @@ def _add_result(request: Request, found: DetectionList, place: str, frame: int, 
         points = required_value(request.path, place, value, "points")
         mask = _polygon(request.path, place, points, (width / 100, height / 100))
         found.add(place, frame, mask.box(), label=_first(request.path, place, value, "polygonlabels"), mask=mask)
+    elif "sequence" in value:
+        raise FormatError(request.path, place, f"keyframes of {abbreviated(one.get('type'))}", "a videorectangle")
     else:
         _refuse_area(request.path, place, one.get("type"))
 

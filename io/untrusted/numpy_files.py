@@ -18,6 +18,7 @@ import numpy as np
 from stseg.arrays import AnyArray
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_bytes
+from stseg.io.untrusted.values import abbreviated
 
 _MAGIC = b"\x93NUMPY"
 _HEADER = re.compile(
@@ -72,7 +73,7 @@ def read_npz(path: Path, most: int = limits.UNPACKED) -> Mapping[str, AnyArray]:
                 rest -= len(data)
                 arrays[member.filename.removesuffix(".npy")] = parse_npy(data)
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, struct.error) as error:
-        raise ValueError(f"no .npz archive, or a broken one ({error})") from error
+        raise ValueError(f"no .npz archive, or a broken one: {abbreviated(str(error))}") from error
     return arrays
 
 

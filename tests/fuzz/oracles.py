@@ -27,7 +27,9 @@ from stseg.io.untrusted import limits
 
 _LINE = 1000
 """Characters of a refusal: values are shown in part."""
-_WHOLE = re.compile(r"(what|something|bytes|no|nothing|numbers|a broken|an image|JSON of|Unable|\d+ (arrays|lines))\b")
+_WHOLE = re.compile(
+    r"(<|what|something|bytes|no|nothing|numbers|a broken|an image|JSON of|Unable|\d+ (arrays|lines))\b"
+)
 """How a refusal of a whole file begins, which names no key."""
 _OTHER_FORMS = ("path", "ground", "vertical", "projection")
 _DEFAULTS: tuple[object, ...] = (False, 0, [])
