@@ -66,6 +66,8 @@ def read_npz(path: Path, most: int = limits.UNPACKED) -> Mapping[str, AnyArray]:
             if len(members) > limits.MEMBERS:
                 raise ValueError(f"{len(members)} members, more than {limits.MEMBERS}")
             for member in members:
+                if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                    raise ValueError("a member that is packed in another way than NumPy packs")
                 with archive.open(member) as file:
                     data = file.read(rest + 1)
                 if len(data) > rest:

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import re
+import zipfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -310,6 +311,9 @@ def test_large_pictures_headers_and_archives_are_refused(tmp_path: Path, monkeyp
     refused(ValueError, r"a .npy header of shape \(1, 1", parse_npy, (tmp_path / "a.npy").read_bytes())
     monkeypatch.setattr(limits, "MEMBERS", 1)
     refused(ValueError, "2 members, more than 1", read_npz, tmp_path / "a.npz")
+    with zipfile.ZipFile(tmp_path / "b.npz", "w", zipfile.ZIP_BZIP2) as archive:
+        archive.writestr("a.npy", b"0")
+    refused(ValueError, "packed in another way", read_npz, tmp_path / "b.npz")
 
 
 @pytest.mark.parametrize("notes", [[], {"a": 5}, {"a": [[1]]}, *({"a": [[*k]]} for k in ("ab", ("a/b", 1), ("a", -1)))])
