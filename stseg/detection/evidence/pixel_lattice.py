@@ -35,7 +35,9 @@ class PixelLattice(NamedTuple):
     outlines: PackedOutlines
     """The pillars (view * height * cell,): most are asked for at one height; areas are fair ones."""
     cells: PillarBoxes
+    """Bounds of each cell."""
     strips: PillarBoxes
+    """The same of each `STRIP_CELLS` cells that follow each other."""
     shapes: Ints
     """int64 (view, 2): rows and columns of the rasters."""
     owner: Shorts

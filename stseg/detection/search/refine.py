@@ -113,7 +113,7 @@ def _scores(pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssig
 
 
 def _box_scores(pool: Candidates, evidence: FrameEvidence, box: Ints, heights: Floats) -> Floats:
-    """The same by boxes alone, `box` int64 (view, person): once for all who keep their place and their boxes."""
+    """Its part by boxes, `box` int64 (view, person), nats: found once for those who keep their place and boxes."""
     names, known = [row.tobytes() for row in np.column_stack([pool.ground, heights, box.T])], evidence.box_scores
     new = [j for j, name in enumerate(names) if name not in known]
     patch, score = pool.ground[new, None] + _PATCH, np.zeros((len(new), heights.shape[1], len(_PATCH)))
