@@ -21,43 +21,29 @@ _STRIDES = ((8, 16, 32), (8, 16, 32, 64))
 
 @dataclass(frozen=True)
 class ScoredBoxes:
-    """Boxes of one picture before a choice.
-
-    Attributes
-    ----------
-    corners : float64 (n, 4)
-        Left, top, right, bottom, pixels of the network's input.
-    score : float64 (n, class)
-        Score of each class, 0..1.
-    """
+    """Boxes of one picture before a choice."""
 
     corners: Floats
+    """float64 (n, 4): left, top, right, bottom, pixels of the network's input."""
     score: Floats
+    """float64 (n, class): score of each class, 0..1."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A layout of outputs, and the pixels that go with it.
-
-    Attributes
-    ----------
-    name, shapes
-        For messages.
-    decode
-        Boxes of the outputs and the size (width, height) of the input; None where the outputs have other shapes.
-    fit, rgb, largest
-        The input: its place, the order of its channels (blue, green, red where not `rgb`), and its value of white.
-    suppressed
-        Whether one person has one candidate already.
-    """
+    """A layout of outputs, and the pixels that go with it."""
 
     name: str
     shapes: str
+    """Its name, and the shapes in words, for messages."""
     decode: Callable[[Outputs, tuple[int, int]], ScoredBoxes | None]
+    """Boxes of the outputs and the size (width, height) of the input; None where the outputs have other shapes."""
     fit: Fit = "centre"
     rgb: bool = True
     largest: float = 1.0
+    """The input: its place, the order of its channels (blue, green, red where not `rgb`), and its value of white."""
     suppressed: bool = False
+    """Whether one person has one candidate already."""
 
 
 def recognise(outputs: Outputs, size: tuple[int, int]) -> Layout | None:

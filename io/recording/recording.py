@@ -114,20 +114,14 @@ class CameraSource:
 
 @dataclass(frozen=True, slots=True)
 class BodyPrior:
-    """Sizes of the bodies that a rig watches, metres; None where the rig does not say.
-
-    Attributes
-    ----------
-    height_mean, height_spread
-        Mean and standard deviation of heights.
-    width_mean, width_spread
-        Of the widths across shoulders and arms.
-    """
+    """Sizes of the bodies that a rig watches, metres; None where the rig does not say."""
 
     height_mean: float | None = None
     height_spread: float | None = None
+    """Mean and standard deviation of heights."""
     width_mean: float | None = None
     width_spread: float | None = None
+    """Mean and standard deviation of the widths across shoulders and arms."""
 
 
 @dataclass(frozen=True)

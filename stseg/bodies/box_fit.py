@@ -31,23 +31,17 @@ Edges = Floats | tuple[float, float, float, float]
 
 
 class ViewBoxes(NamedTuple):
-    """Boxes of one view.
-
-    Attributes
-    ----------
-    edges : float64 (box, 4)
-        left, top, right, bottom, pixels, within the image.
-    tolerance : float64 (box, 5), belief : float64 (box,)
-        Of each box; see `half_square` and `BoxNoise`.
-    width, height
-        Size of the image, pixels.
-    """
+    """Boxes of one view."""
 
     edges: Floats
+    """float64 (box, 4): left, top, right, bottom, pixels, within the image."""
     tolerance: Floats
+    """float64 (box, 5): tolerances of each box; see `half_square` and `BoxNoise`."""
     belief: Floats
+    """float64 (box,): belief in each box; see `half_square` and `BoxNoise`."""
     width: float
     height: float
+    """Size of the image, pixels."""
 
 
 @part

@@ -10,27 +10,18 @@ from stseg.bodies.outlines import Spans
 
 
 class PackedOutlines(NamedTuple):
-    """Outlines of pillars (n,) on a raster; see `stseg.bodies.outlines`.
-
-    Attributes
-    ----------
-    first : int64 (n,)
-        First raster row of each.
-    start : int64 (n + 1,)
-        First span of each; rows follow each other from the outline's first to its last.
-    spans : int16 (span, 2)
-        Columns from (included) to (excluded).
-    area : float64 (n,)
-        Pixels of the whole outline, those outside the raster included.
-    inside : int64 (n,)
-        Pixels of the outline on the raster.
-    """
+    """Outlines of pillars (n,) on a raster; see `stseg.bodies.outlines`."""
 
     first: Ints
+    """int64 (n,): first raster row of each."""
     start: Ints
+    """int64 (n + 1,): first span of each; rows follow each other from the outline's first to its last."""
     spans: Spans
+    """int16 (span, 2): columns from (included) to (excluded)."""
     area: Floats
+    """float64 (n,): pixels of the whole outline, those outside the raster included."""
     inside: Ints
+    """int64 (n,): pixels of the outline on the raster."""
 
     @classmethod
     def of(cls, parts: Iterable[tuple[Ints, Spans, Floats]]) -> Self:

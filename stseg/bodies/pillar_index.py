@@ -29,26 +29,18 @@ _CLASSES = 2.0
 
 
 class PillarIndex(NamedTuple):
-    """Sorted pillars of one view; pillars outside the image are left out.
-
-    Attributes
-    ----------
-    order : int32 (k,)
-        Numbers of the pillars, by class, then by column.
-    middle, top, bottom : float64 (k,)
-        Column of the middle of each, and rows of its edges, clipped to the image, pixels.
-    start : int64 (class + 1,)
-        First of each class in `order`.
-    tallest : float64 (class,)
-        Height of the tallest pillar of each class, pixels.
-    """
+    """Sorted pillars of one view; pillars outside the image are left out."""
 
     order: Labels
+    """int32 (k,): numbers of the pillars, by class, then by column."""
     middle: Floats
     top: Floats
     bottom: Floats
+    """float64 (k,) each: column of the middle of each, and rows of its edges, clipped to the image, pixels."""
     start: Ints
+    """int64 (class + 1,): first of each class in `order`."""
     tallest: Floats
+    """float64 (class,): height of the tallest pillar of each class, pixels."""
 
     @classmethod
     def of(cls, bodies: Floats | Singles, size: tuple[int, int]) -> Self:

@@ -29,25 +29,18 @@ WIDTH = 2 * float(SILHOUETTE[:, 1].max())
 
 
 class BodyTable(NamedTuple):
-    """Projected lattice of one view.
-
-    Attributes
-    ----------
-    origin, step
-        Ground position of the first lattice point and the lattice's spacing, metres.
-    pixel : float32 (y, x, level, 2)
-        Pixel of each lattice point at each level, which a body needs together; nan where the camera does not see it.
-    size
-        Width and height of the image, pixels.
-    breadth
-        Ratio of the radii of boxes' pillars to those of people.
-    """
+    """Projected lattice of one view."""
 
     origin: tuple[float, float]
     step: float
+    """Ground position of the first lattice point and the lattice's spacing, metres."""
     pixel: Singles
+    """float32 (y, x, level, 2): pixel of each lattice point at each level, which a body needs together; nan where the
+    camera does not see it."""
     size: tuple[int, int]
+    """Width and height of the image, pixels."""
     breadth: float = 1.0
+    """Ratio of the radii of boxes' pillars to those of people."""
 
     @classmethod
     def of(cls, camera: Camera, grid: Grid, step: float = 0.12, margin: float = 0.6, breadth: float = 1.0) -> BodyTable:

@@ -26,25 +26,18 @@ _LEAST_INSIDE = 0.02
 
 @dataclass(frozen=True)
 class ViewObservation:
-    """Observation of one view in one frame: boxes clipped to the image, or a raster of log-odds; the other is empty.
-
-    Attributes
-    ----------
-    edges : float64 (box, 4)
-        left, top, right, bottom, pixels.
-    score : float64 (box,)
-        0..1.
-    tolerance : float64 (box, 5), belief : float64 (box,)
-        See `stseg.bodies.box_fit`.
-    raster : float32 (v, u)
-        Log-odds of foreground, nats.
-    """
+    """Observation of one view in one frame: boxes clipped to the image, or a raster of log-odds; the other is empty."""
 
     edges: Floats
+    """float64 (box, 4): left, top, right, bottom, pixels."""
     score: Floats
+    """float64 (box,): 0..1."""
     tolerance: Floats
+    """float64 (box, 5): see `stseg.bodies.box_fit`."""
     belief: Floats
+    """float64 (box,): see `stseg.bodies.box_fit`."""
     raster: Singles
+    """float32 (v, u): log-odds of foreground, nats."""
 
     @cached_property
     def is_foreground(self) -> Flags:
@@ -69,20 +62,14 @@ ViewObservations = Sequence[ViewObservation | None]
 
 
 class TriedPillars(NamedTuple):
-    """Pillars that are tried for each person.
-
-    Attributes
-    ----------
-    ground : float64 (person, pillar, 2)
-        Metres.
-    height, width, area_ratio : float64 (person, pillar)
-        Metres, metres, and `View.area_ratio`.
-    """
+    """Pillars that are tried for each person."""
 
     ground: Floats
+    """float64 (person, pillar, 2): metres."""
     height: Floats
     width: Floats
     area_ratio: Floats
+    """float64 (person, pillar) each: metres, metres, and `View.area_ratio`."""
 
 
 class View:

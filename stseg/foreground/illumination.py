@@ -40,19 +40,13 @@ _SURROUNDINGS = 0.02  # of the width of the view: how far the surroundings of a 
 
 @dataclass(slots=True)
 class LightChange:
-    """One sudden illumination change of a view.
-
-    Attributes
-    ----------
-    first, last
-        Frames between which the light changed, counted from the first call of `likelihood`.
-    blind
-        Number of frames without evidence.
-    """
+    """One sudden illumination change of a view."""
 
     first: int
     last: int
+    """Frames between which the light changed, counted from the first call of `likelihood`."""
     blind: int = 0
+    """Number of frames without evidence."""
 
 
 class IlluminationMonitor:

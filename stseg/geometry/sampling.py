@@ -35,18 +35,13 @@ _DERIVATIVE_STEP = 1e-3
 
 @dataclass(frozen=True)
 class Sampling:
-    """Look-up tables of a rig.
-
-    Attributes
-    ----------
-    footprint : int16 (view, plane, y, x, 4)
-        The pixels that show each cell; width 0 where the view does not see it, or it lies outside the area.
-    distance : float32 (view, y, x)
-        Distance of the cell from the camera along the ground, metres.
-    """
+    """Look-up tables of a rig."""
 
     footprint: Footprints
+    """int16 (view, plane, y, x, 4): the pixels that show each cell; width 0 where the view does not see it, or it lies
+    outside the area."""
     distance: Singles
+    """float32 (view, y, x): distance of the cell from the camera along the ground, metres."""
 
     @classmethod
     def of(cls, rig: Rig, kind: SamplingKind) -> Sampling:
@@ -133,22 +128,15 @@ def _span_about(centre: float, extent: float, size: int) -> tuple[int, int]:
 
 
 class LensTerms(NamedTuple):
-    """A lens for kernels.
-
-    Attributes
-    ----------
-    matrix : float64 (3, 3)
-        Camera matrix, pixels.
-    distortion : float64 (8,)
-        k1, k2, p1, p2, k3, k4, k5, k6, or k1 to k4 of a fisheye; all 0 for an ideal image.
-    bends, fisheye : bool
-        Whether there is a lens, and whether it is a fisheye.
-    """
+    """A lens for kernels."""
 
     matrix: Floats
+    """float64 (3, 3): camera matrix, pixels."""
     distortion: Floats
+    """float64 (8,): k1, k2, p1, p2, k3, k4, k5, k6, or k1 to k4 of a fisheye; all 0 for an ideal image."""
     bends: bool
     fisheye: bool
+    """bool each: whether there is a lens, and whether it is a fisheye."""
 
     @classmethod
     def of(cls, lens: Lens | None) -> Self:

@@ -18,25 +18,17 @@ _OUTSIDE = -1
 
 @dataclass(frozen=True)
 class CellSubset:
-    """Cells of a grid and the edges between them.
-
-    Attributes
-    ----------
-    cell : int64 (n,)
-        Indices in the flattened grid, ascending.
-    start, end : int64 (edge,)
-        Edges as indices of `cell`.
-    weight : int64 (edge,)
-        Capacities, quanta.
-    border : int64 (n,)
-        Sum of each cell's capacities to cells outside, quanta.
-    """
+    """Cells of a grid and the edges between them."""
 
     cell: Ints
+    """int64 (n,): indices in the flattened grid, ascending."""
     start: Ints
     end: Ints
+    """int64 (edge,) each: edges as indices of `cell`."""
     weight: Ints
+    """int64 (edge,): capacities, quanta."""
     border: Ints
+    """int64 (n,): sum of each cell's capacities to cells outside, quanta."""
 
     def components(self) -> Ints:
         """Connected component of each cell, from 0, int64 (n,)."""

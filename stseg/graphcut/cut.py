@@ -24,18 +24,12 @@ GREATEST_CAPACITY = 16383
 
 @dataclass(frozen=True)
 class Cut:
-    """A minimum cut.
-
-    Attributes
-    ----------
-    occupied : bool (time, plane, y, x)
-        Cells with label 1.
-    nodes
-        Number of cells that the reduction left undecided.
-    """
+    """A minimum cut."""
 
     occupied: Flags
+    """bool (time, plane, y, x): cells with label 1."""
     nodes: int
+    """Number of cells that the reduction left undecided."""
 
 
 def minimum_cut(energy: GridEnergy) -> Cut:
@@ -98,27 +92,18 @@ WEAK_SHARE_LIMIT = 0.9
 
 @dataclass(frozen=True)
 class Reduction:
-    """Labels known before the cut, and the problem that remains.
-
-    Attributes
-    ----------
-    lattice
-        Numbering of the nodes.
-    capacity : int32 (degree,)
-        Capacities of the arcs of a node, quanta.
-    state : uint8 (node,)
-        State of each node.
-    left : int32 (k,)
-        Undecided nodes, ascending.
-    excess : int32 (k,)
-        Their unary terms with the capacities to decided neighbours added, quanta.
-    """
+    """Labels known before the cut, and the problem that remains."""
 
     lattice: Lattice
+    """Numbering of the nodes."""
     capacity: Labels
+    """int32 (degree,): capacities of the arcs of a node, quanta."""
     state: Bytes
+    """uint8 (node,): state of each node."""
     left: Labels
+    """int32 (k,): undecided nodes, ascending."""
     excess: Labels
+    """int32 (k,): their unary terms with the capacities to decided neighbours added, quanta."""
 
 
 def reduce(energy: GridEnergy) -> Reduction:

@@ -29,28 +29,19 @@ BACKGROUND = 0
 
 @dataclass(frozen=True)
 class LabelEnergy:
-    """Unary costs and Potts weights of n nodes, quanta.
-
-    Attributes
-    ----------
-    first : int64 (n + 1,)
-        Node p may have label[first[p]] .. label[first[p + 1] - 1] or the background at cost 0.
-    label : int64 (m,)
-        1 or more; ascending for each node.
-    cost : int64 (m,)
-        D_p of that label, relative to the background.
-    start, end : int64 (edge,)
-        Ends of each edge, which differ; each pair once.
-    weight : int64 (edge,)
-        w: cost of different labels, 0 or more.
-    """
+    """Unary costs and Potts weights of n nodes, quanta."""
 
     first: Ints
+    """int64 (n + 1,): node p may have label[first[p]] .. label[first[p + 1] - 1] or the background at cost 0."""
     label: Ints
+    """int64 (m,): 1 or more; ascending for each node."""
     cost: Ints
+    """int64 (m,): D_p of that label, relative to the background."""
     start: Ints
     end: Ints
+    """int64 (edge,) each: ends of each edge, which differ; each pair once."""
     weight: Ints
+    """int64 (edge,): w: cost of different labels, 0 or more."""
 
     @property
     def cells(self) -> int:

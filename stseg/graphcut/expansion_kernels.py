@@ -9,18 +9,13 @@ from stseg.kernels.accelerate import kernel
 
 
 class Neighbours(NamedTuple):
-    """Neighbours in compressed rows: those of node p are first[p] .. first[p + 1] - 1.
-
-    Attributes
-    ----------
-    first : int64 (n + 1,)
-    cell, weight : int64 (2 edge,)
-        Neighbour and Potts weight, quanta.
-    """
+    """Neighbours in compressed rows: those of node p are first[p] .. first[p + 1] - 1."""
 
     first: Ints
+    """int64 (n + 1,)."""
     cell: Ints
     weight: Ints
+    """int64 (2 edge,) each: neighbour and Potts weight, quanta."""
 
 
 class Arcs(NamedTuple):

@@ -23,27 +23,21 @@ QUANTUM = 1e-3
 
 @dataclass(frozen=True)
 class GridEnergy:
-    """Unary and pairwise terms, quanta.
-
-    Attributes
-    ----------
-    unary : int32 (time, plane, y, x)
-        u: gain of label 1 over label 0, quanta.
-    offsets : int64 (k, 4)
-        One offset (time, plane, y, x) of each opposite pair of neighbours: those within a frame, then those in time.
-    capacity : int32 (k,)
-        B: cost of different labels at each offset, quanta.
-    successor : int32 (time - 1, y, x)
-        Cell (y columns + x) of the next frame to which each cell's edges in time lead; -1 for none. Injective.
-    present : bool (y, x), or None
-        Where there are cells, in all frames and planes: others have no edges, and label 0. None for everywhere.
-    """
+    """Unary and pairwise terms, quanta."""
 
     unary: Labels
+    """int32 (time, plane, y, x): u, gain of label 1 over label 0, quanta."""
     offsets: Ints
+    """int64 (k, 4): one offset (time, plane, y, x) of each opposite pair of neighbours: those within a frame, then
+    those in time."""
     capacity: Labels
+    """int32 (k,): B, cost of different labels at each offset, quanta."""
     successor: Labels
+    """int32 (time - 1, y, x): cell (y columns + x) of the next frame to which each cell's edges in time lead; -1 for
+    none. Injective."""
     present: Flags | None = None
+    """bool (y, x), or None: where there are cells, in all frames and planes: others have no edges, and label 0. None
+    for everywhere."""
 
     @cached_property
     def lattice(self) -> Lattice:

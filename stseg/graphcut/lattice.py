@@ -13,24 +13,18 @@ class Lattice(NamedTuple):
 
     The first plane of a frame, the first row of a plane and the first cell of a row are guards, not cells: an arc off
     the grid ends at one of them.
-
-    Attributes
-    ----------
-    steps : int32 (degree,)
-        Difference of node numbers along each arc within a frame; slots 2 i and 2 i + 1 are opposite.
-    forward, backward : int32 (node,)
-        Difference of node numbers to the successor in the next frame and to the predecessor; 0 for none.
-    spatial
-        Number of arc slots within a frame; those after it lead to the next (even) and previous frame (odd).
-    frame
-        Number of nodes of a frame, guards included.
     """
 
     steps: Labels
+    """int32 (degree,): difference of node numbers along each arc within a frame; slots 2 i and 2 i + 1 are opposite."""
     forward: Labels
     backward: Labels
+    """int32 (node,) each: difference of node numbers to the successor in the next frame and to the predecessor; 0 for
+    none."""
     spatial: int
+    """Number of arc slots within a frame; those after it lead to the next (even) and previous frame (odd)."""
     frame: int
+    """Number of nodes of a frame, guards included."""
 
 
 def lattice_of(shape: tuple[int, ...], offsets: Ints, successor: Labels) -> Lattice:

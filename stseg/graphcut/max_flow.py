@@ -23,62 +23,41 @@ _UNBOUNDED = 1 << 30
 
 
 class Graph(NamedTuple):
-    """A residual graph.
-
-    Attributes
-    ----------
-    residual : int32 (arc,)
-        Residual capacities (n-links); the arcs of a node are consecutive.
-    excess : int32 (n,)
-        Residual capacity of each t-link: from the source (> 0) or to the sink (< 0).
-    first : int32 (n + 1,)
-        First arc of each node.
-    sister, head : int32 (arc,)
-        Reverse arc of each arc, and the node at its end.
-    """
+    """A residual graph."""
 
     residual: Labels
+    """int32 (arc,): residual capacities (n-links); the arcs of a node are consecutive."""
     excess: Labels
+    """int32 (n,): residual capacity of each t-link: from the source (> 0) or to the sink (< 0)."""
     first: Labels
+    """int32 (n + 1,): first arc of each node."""
     sister: Labels
     head: Labels
+    """int32 (arc,) each: reverse arc of each arc, and the node at its end."""
 
 
 class Trees(NamedTuple):
-    """The two search trees.
-
-    Attributes
-    ----------
-    parent : int32 (n,)
-        Arc to the parent, or one of the codes above.
-    tree : uint8 (n,)
-        Tree of a node that is not free: SOURCE or SINK.
-    timestamp, distance : int32 (n,)
-        Arcs between a node and its terminal, and the time at which they were counted.
-    active : uint8 (n,)
-        Whether the node is in the queue of active nodes.
-    """
+    """The two search trees."""
 
     parent: Labels
+    """int32 (n,): arc to the parent, or one of the codes above."""
     tree: Bytes
+    """uint8 (n,): tree of a node that is not free: SOURCE or SINK."""
     timestamp: Labels
     distance: Labels
+    """int32 (n,) each: arcs between a node and its terminal, and the time at which they were counted."""
     active: Bytes
+    """uint8 (n,): whether the node is in the queue of active nodes."""
 
 
 class Queue(NamedTuple):
-    """Ring buffers of the active nodes and of the orphans.
-
-    Attributes
-    ----------
-    active_nodes, orphans : int32 (n + 1,)
-    ends : int64 (5,)
-        First and past the last active node; the same of the orphans; the time.
-    """
+    """Ring buffers of the active nodes and of the orphans."""
 
     active_nodes: Labels
     orphans: Labels
+    """int32 (n + 1,) each."""
     ends: Ints
+    """int64 (5,): first and past the last active node; the same of the orphans; the time."""
 
 
 def solve(graph: Graph) -> Flags:

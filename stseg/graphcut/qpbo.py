@@ -24,20 +24,14 @@ COMPONENT_LIMIT = 12
 
 @dataclass(frozen=True)
 class QuadraticEnergy:
-    """Terms of n binary variables, quanta.
-
-    Attributes
-    ----------
-    unary : int64 (n,)
-        a.
-    start, end, weight : int64 (edge,)
-        Two different nodes and b: attraction below 0, repulsion above.
-    """
+    """Terms of n binary variables, quanta."""
 
     unary: Ints
+    """int64 (n,): a."""
     start: Ints
     end: Ints
     weight: Ints
+    """int64 (edge,) each: two different nodes and b: attraction below 0, repulsion above."""
 
     def of(self, labels: Flags) -> int:
         """Energy of labels, bool (n,)."""
@@ -47,17 +41,12 @@ class QuadraticEnergy:
 
 @dataclass(frozen=True)
 class QuadraticMinimum:
-    """Labels of low energy.
-
-    Attributes
-    ----------
-    labels : bool (n,)
-    gap
-        Bound on the distance from the least energy, quanta; 0 where the labels are a global minimum.
-    """
+    """Labels of low energy."""
 
     labels: Flags
+    """bool (n,)."""
     gap: int
+    """Bound on the distance from the least energy, quanta; 0 where the labels are a global minimum."""
 
 
 def minimise(energy: QuadraticEnergy, cut: Callable[..., Flags] = sparse_cut) -> QuadraticMinimum:

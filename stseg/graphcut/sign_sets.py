@@ -19,18 +19,12 @@ GUARD, UNDECIDED, LABEL_ONE, LABEL_ZERO = 0, 1, 2, 3
 
 @dataclass(frozen=True)
 class SignSets:
-    """The greatest sets of both signs.
-
-    Attributes
-    ----------
-    state : uint8 (node,)
-        State of each node; not to be written to.
-    weak
-        Number of cells with u <= 0 and a unary term below the sum of their capacities.
-    """
+    """The greatest sets of both signs."""
 
     state: Bytes
+    """uint8 (node,): state of each node; not to be written to."""
     weak: int
+    """Number of cells with u <= 0 and a unary term below the sum of their capacities."""
 
 
 def sign_sets(unary: Labels, lattice: Lattice, capacity: Labels, present: Flags | None) -> SignSets:

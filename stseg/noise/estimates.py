@@ -11,22 +11,14 @@ from stseg.view_health.view_failures import ViewFailures
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of one session; each frame that is explained updates them.
-
-    Attributes
-    ----------
-    box_noise, box_bias
-        Noise of detectors' boxes, and the mean error of their lower edges.
-    population
-        Sizes of people.
-    rims
-        Eaten edges of silhouettes.
-    failures
-        Views that fail.
-    """
+    """Estimates of one session; each frame that is explained updates them."""
 
     box_noise: BoxNoiseEstimate
     box_bias: BoxBiasEstimate
+    """Noise of detectors' boxes, and the mean error of their lower edges."""
     population: PopulationEstimate
+    """Sizes of people."""
     rims: RimEstimate
+    """Eaten edges of silhouettes."""
     failures: ViewFailures
+    """Views that fail."""

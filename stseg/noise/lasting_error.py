@@ -39,19 +39,13 @@ _SHARE_VARIANCE = 2.9
 
 @dataclass(frozen=True)
 class LastingError:
-    """Errors of some quantities, all float64 (quantity,); of one alone, ().
-
-    Attributes
-    ----------
-    white, lasting
-        a^2 and b^2, in the square of the quantity's unit.
-    seconds
-        tau.
-    """
+    """Errors of some quantities, all float64 (quantity,); of one alone, ()."""
 
     white: Floats
     lasting: Floats
+    """a^2 and b^2, in the square of the quantity's unit."""
     seconds: Floats
+    """tau."""
 
     @property
     def variance(self) -> Floats:

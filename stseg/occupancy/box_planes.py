@@ -30,21 +30,14 @@ _LEAST_FIT = 18.0
 
 
 class CellsByPerson(NamedTuple):
-    """Ground cells by the person near them.
-
-    Attributes
-    ----------
-    near_person : int64 (cell,)
-        The person near each cell, -1 for none.
-    cell : int64 (n,)
-        Cells near a person, in the order of persons.
-    start : int64 (person + 1,)
-        Index in `cell` of each person's first cell.
-    """
+    """Ground cells by the person near them."""
 
     near_person: Ints
+    """int64 (cell,): the person near each cell, -1 for none."""
     cell: Ints
+    """int64 (n,): cells near a person, in the order of persons."""
     start: Ints
+    """int64 (person + 1,): index in `cell` of each person's first cell."""
 
     @classmethod
     def of(cls, near_person: Ints, people: int) -> Self:
@@ -56,18 +49,13 @@ class CellsByPerson(NamedTuple):
 
 
 class CellFit(NamedTuple):
-    """Fit of boxes to bodies at ground cells.
-
-    Attributes
-    ----------
-    found : bool (cell,)
-        Cells that some box fits.
-    best : float32 (height, cell)
-        At these cells, the log-likelihood of the best box of each height, -inf where there is none.
-    """
+    """Fit of boxes to bodies at ground cells."""
 
     found: Flags
+    """bool (cell,): cells that some box fits."""
     best: Singles
+    """float32 (height, cell): at these cells, the log-likelihood of the best box of each height, -inf where there is
+    none."""
 
     @classmethod
     def unfilled(cls, heights: int, cells: int) -> Self:

@@ -34,62 +34,41 @@ _CELLS_AT_ONCE = 256
 
 
 class ErrorRates(NamedTuple):
-    """Error rates of a view.
-
-    Attributes
-    ----------
-    miss
-        m: how often a cell of a body is missed.
-    clutter
-        b: how often the ray of an empty cell near no person meets foreground.
-    near_clutter
-        b of the empty cells within reach of a person.
-    """
+    """Error rates of a view."""
 
     miss: float
+    """m: how often a cell of a body is missed."""
     clutter: float
+    """b: how often the ray of an empty cell near no person meets foreground."""
     near_clutter: float
+    """b of the empty cells within reach of a person."""
 
 
 class FrameTerms(NamedTuple):
-    """Terms of the views of a frame at cells (n,).
-
-    Attributes
-    ----------
-    levels : int16 (view, n)
-        Mean likelihood of each cell, or UNSEEN.
-    share : float32 (view, n)
-        a_i, 0..1: visible share of the footprint; of any value where the level is UNSEEN.
-    near_person : int32 (n,)
-        The person near each cell, -1 for none.
-    terms : float32 (view, 2, TOP_LEVEL + 1)
-        The term of each level near no person, and within reach of a person, nats.
-    weight : float32 (view,)
-        1 / C_i, in any scale.
-    confidence : float32 (view, person)
-        Further factor of the terms near each person, 0..1, which does not reduce the view's count.
-    """
+    """Terms of the views of a frame at cells (n,)."""
 
     levels: Levels
+    """int16 (view, n): mean likelihood of each cell, or UNSEEN."""
     share: Singles
+    """float32 (view, n): a_i, 0..1: visible share of the footprint; of any value where the level is UNSEEN."""
     near_person: Labels
+    """int32 (n,): the person near each cell, -1 for none."""
     terms: Singles
+    """float32 (view, 2, TOP_LEVEL + 1): the term of each level near no person, and within reach of a person, nats."""
     weight: Singles
+    """float32 (view,): 1 / C_i, in any scale."""
     confidence: Singles
+    """float32 (view, person): further factor of the terms near each person, 0..1, which does not reduce the view's
+    count."""
 
 
 class Sums(NamedTuple):
-    """Sums over the views of a frame at cells (n,).
-
-    Attributes
-    ----------
-    weighted, weights, shares : float32 (n,)
-        Sums of w_i a_i times term, of w_i a_i, and of a_i.
-    """
+    """Sums over the views of a frame at cells (n,)."""
 
     weighted: Singles
     weights: Singles
     shares: Singles
+    """float32 (n,) each: sums of w_i a_i times term, of w_i a_i, and of a_i."""
 
     @classmethod
     def of(cls, views: FrameTerms, memory: Singles | None = None) -> Self:

@@ -40,48 +40,31 @@ sees none of its cells."""
 
 
 class ViewSets(NamedTuple):
-    """Sets of views that see a cell.
-
-    Attributes
-    ----------
-    of_cell : int32 (cell,)
-        The set of each cell that a view sees, in block order.
-    seen_by : bool (set, view)
-        The views of each set.
-    size : int64 (set,)
-        Number of cells of each set.
-    """
+    """Sets of views that see a cell."""
 
     of_cell: Labels
+    """int32 (cell,): the set of each cell that a view sees, in block order."""
     seen_by: Flags
+    """bool (set, view): the views of each set."""
     size: Ints
+    """int64 (set,): number of cells of each set."""
 
 
 class ShownCells(NamedTuple):
-    """The cells (n,) of a frame that are fused one by one, and the representatives (k,) of the others.
-
-    Attributes
-    ----------
-    block : int32 (b,)
-        The blocks that have any, as indices among those of all planes.
-    start : int32 (b + 1,)
-        First cell of each block among these, and n behind the last one.
-    first : int32 (b,)
-        First cell of each block in block order, among all cells that a view sees.
-    in_volume : int32 (n,)
-        Index in the flattened volume.
-    others : float64 (k,)
-        Cells that each representative stands for.
-    near_person : int32 (n + k,)
-        The person near each, -1 for none.
-    """
+    """The cells (n,) of a frame that are fused one by one, and the representatives (k,) of the others."""
 
     block: Labels
+    """int32 (b,): the blocks that have any, as indices among those of all planes."""
     start: Labels
+    """int32 (b + 1,): first cell of each block among these, and n behind the last one."""
     first: Labels
+    """int32 (b,): first cell of each block in block order, among all cells that a view sees."""
     in_volume: Labels
+    """int32 (n,): index in the flattened volume."""
     others: Floats
+    """float64 (k,): cells that each representative stands for."""
     near_person: Labels
+    """int32 (n + k,): the person near each, -1 for none."""
 
     def counted(self) -> tuple[Ints, Floats]:
         """Those that are counted, near a person or for others as well, and the number that each of these stands for.

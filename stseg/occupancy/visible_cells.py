@@ -22,31 +22,23 @@ SHOULDER = 0.3
 
 
 class PixelAssignment(NamedTuple):
-    """The person that each pixel of a view shows.
-
-    Attributes
-    ----------
-    raster : int16 (v, u)
-        Person of the nearest body at each raster pixel, -1 for none.
-    occupied : int32 (v + 1, u + 1)
-        Number of raster pixels above and to the left that show a person.
-    step : int
-        Image pixels to a raster pixel.
-    row : int64 (image v,), column : int64 (image u,)
-        Raster row and column of each row and column of the image.
-    distance : float64 (1 + person,)
-        From the camera along the ground, metres; the first is that of no person, infinite.
-    separate : bool (person,)
-        Whether a box of this view is assigned to the person: the cells near such a person count as unoccluded.
-    """
+    """The person that each pixel of a view shows."""
 
     raster: NDArray[np.int16]
+    """int16 (v, u): person of the nearest body at each raster pixel, -1 for none."""
     occupied: Labels
+    """int32 (v + 1, u + 1): number of raster pixels above and to the left that show a person."""
     step: int
+    """Image pixels to a raster pixel."""
     row: Ints
+    """int64 (image v,): raster row of each row of the image."""
     column: Ints
+    """int64 (image u,): raster column of each column of the image."""
     distance: Floats
+    """float64 (1 + person,): from the camera along the ground, metres; the first is that of no person, infinite."""
     separate: Flags
+    """bool (person,): whether a box of this view is assigned to the person: the cells near such a person count as
+    unoccluded."""
 
 
 @part

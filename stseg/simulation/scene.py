@@ -20,57 +20,6 @@ KINDS: tuple[Kind, ...] = ("video", "masks", "boxes")
 class SceneSpec:
     """A scene to simulate. Equal specifications make equal scenes, to the last pixel.
 
-    Attributes
-    ----------
-    name
-        The scene's name.
-    people
-        Number of people in the area, where those who leave are replaced; with an absence, all who ever come.
-    area
-        Sides of the ground rectangle along x and y, metres; its centre is the origin.
-    seconds, frame_rate
-        Length of the recording and frames per second.
-    cameras
-        Number of views, evenly around the area. Half of an even number are every other one of the same cameras.
-    camera_distance, camera_height
-        From the area's centre along the ground, and above it, metres; each camera is a little off.
-    field_of_view
-        Of the ideal image along its width, degrees.
-    size
-        Width and height of the images, pixels.
-    distortion
-        k1, k2, p1, p2, k3 of OpenCV's lens model; shorter lists are filled with zeros.
-    noise
-        Standard deviation of the sensor's noise, grey levels.
-    light_drift, light_period
-        Relative amplitude of the light's slow change, and its period in seconds.
-    lamps
-        Sudden changes of the light; they add up.
-    shadows
-        Darkening of the ground by the people's shadows, 0..1.
-    quality
-        JPEG quality of the frames, 1..100.
-    speed
-        Slowest and fastest preferred walking speed, metres per second.
-    alike
-        Number of people (the first ones) in clothes of similar colours.
-    stay
-        Mean time that a person stays, seconds.
-    absence
-        Mean time after which a person who left comes back, seconds; 0 where only new people come.
-    heights
-        Shortest and tallest person, metres, uniformly between; empty for adults.
-    cylinder
-        Width of upright cylinders that stand for bodies, metres; 0 for bodies that walk.
-    length
-        Their length in the direction in which they face, metres: animals are ellipses from above; 0 for as wide.
-    routes
-        Scripted routes, one a person; without them people walk freely.
-    kinds
-        Kinds of foreground that are written, of `KINDS`; without video, views have no image.
-    seed
-        Seed of all random streams.
-
     Raises
     ------
     ConfigError
@@ -78,32 +27,56 @@ class SceneSpec:
     """
 
     name: str
+    """The scene's name."""
     people: int
+    """Number of people in the area, where those who leave are replaced; with an absence, all who ever come."""
     area: tuple[float, float]
+    """Sides of the ground rectangle along x and y, metres; its centre is the origin."""
     seconds: float
     frame_rate: float = 10.0
+    """Length of the recording and frames per second."""
     cameras: int = 4
+    """Number of views, evenly around the area. Half of an even number are every other one of the same cameras."""
     camera_distance: float = 6.5
     camera_height: float = 2.8
+    """From the area's centre along the ground, and above it, metres; each camera is a little off."""
     field_of_view: float = 66.0
+    """Of the ideal image along its width, degrees."""
     size: tuple[int, int] = (480, 360)
+    """Width and height of the images, pixels."""
     distortion: tuple[float, ...] = (-0.22, 0.05, 0.001, -0.001)
+    """k1, k2, p1, p2, k3 of OpenCV's lens model; shorter lists are filled with zeros."""
     noise: float = 3.0
+    """Standard deviation of the sensor's noise, grey levels."""
     light_drift: float = 0.05
     light_period: float = 20.0
+    """Relative amplitude of the light's slow change, and its period in seconds."""
     lamps: tuple[Lamp, ...] = ()
+    """Sudden changes of the light; they add up."""
     shadows: float = 0.35
+    """Darkening of the ground by the people's shadows, 0..1."""
     quality: int = 85
+    """JPEG quality of the frames, 1..100."""
     speed: tuple[float, float] = (0.6, 1.5)
+    """Slowest and fastest preferred walking speed, metres per second."""
     alike: int = 0
+    """Number of people (the first ones) in clothes of similar colours."""
     stay: float = 15.0
+    """Mean time that a person stays, seconds."""
     absence: float = 0.0
+    """Mean time after which a person who left comes back, seconds; 0 where only new people come."""
     heights: tuple[float, ...] = ()
+    """Shortest and tallest person, metres, uniformly between; empty for adults."""
     cylinder: float = 0.0
+    """Width of upright cylinders that stand for bodies, metres; 0 for bodies that walk."""
     length: float = 0.0
+    """Their length in the direction in which they face, metres: animals are ellipses from above; 0 for as wide."""
     routes: tuple[Route, ...] = ()
+    """Scripted routes, one a person; without them people walk freely."""
     kinds: tuple[Kind, ...] = KINDS
+    """Kinds of foreground that are written, of `KINDS`; without video, views have no image."""
     seed: int = 1
+    """Seed of all random streams."""
 
     def __post_init__(self) -> None:
         width, depth = self.area

@@ -32,25 +32,17 @@ _REPORTED_SHARE = 0.6
 
 @dataclass(frozen=True)
 class Knock:
-    """A downward step of a view's agreement.
-
-    Attributes
-    ----------
-    view
-        Index of the view.
-    frame
-        Index of the first frame after the knock.
-    before, after
-        Median score on either side, in the unit of the input.
-    errors
-        Size of the step in standard errors.
-    """
+    """A downward step of a view's agreement."""
 
     view: int
+    """Index of the view."""
     frame: int
+    """Index of the first frame after the knock."""
     before: float
     after: float
+    """Median score on either side, in the unit of the input."""
     errors: float
+    """Size of the step in standard errors."""
 
 
 def find_knocks(agreement: Floats, least: float = 0.0) -> list[Knock]:
@@ -118,18 +110,12 @@ def _frames_per_sample(residual: Floats) -> float:
 
 @dataclass(frozen=True)
 class ViewResidual:
-    """A view with a systematic residual across its line of sight.
-
-    Attributes
-    ----------
-    view
-        Its number.
-    metres
-        Median residual, positive to the right of the image.
-    """
+    """A view with a systematic residual across its line of sight."""
 
     view: int
+    """Its number."""
     metres: float
+    """Median residual, positive to the right of the image."""
 
 
 def views_off(residuals: Floats, cell: float) -> list[ViewResidual]:

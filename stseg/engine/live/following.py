@@ -123,18 +123,12 @@ def follow_recording(
 
 @dataclass(frozen=True)
 class Followed:
-    """Result of a finished online run.
-
-    Attributes
-    ----------
-    run
-        The run file.
-    delay
-        Latency from the arrival of frames to their tracks in the live table, in words; empty without any tracks.
-    """
+    """Result of a finished online run."""
 
     run: Run
+    """The run file."""
     delay: str
+    """Latency from the arrival of frames to their tracks in the live table, in words; empty without any tracks."""
 
 
 def _follow(

@@ -27,18 +27,12 @@ _Frames = TypeVar("_Frames", range, Sequence[int])
 
 @dataclass(frozen=True)
 class BackgroundFrames:
-    """Training frames of the backgrounds of a segment.
-
-    Attributes
-    ----------
-    part
-        Background period of the segment, from which a camera without an empty scene is trained.
-    before
-        Period before the segment's warm-up, by which the background of a camera with an empty scene is updated.
-    """
+    """Training frames of the backgrounds of a segment."""
 
     part: range
+    """Background period of the segment, from which a camera without an empty scene is trained."""
     before: range
+    """Period before the segment's warm-up, by which the background of a camera with an empty scene is updated."""
 
 
 def make_foregrounds(

@@ -17,30 +17,21 @@ from stseg.trackers import find_tracker
 
 @dataclass(frozen=True)
 class Job:
-    """The input of a run.
-
-    Attributes
-    ----------
-    recording, config, tracker
-        The streams, the constants of all stages, and the tracker's name.
-    volume
-        The part of the volume that is kept: all of it, the surroundings of tracks, or nothing.
-    first, stop
-        The frames of the run, half open.
-    streams
-        Lengths and frame times of the streams (`stseg.io.recording.aligned_stream`).
-    known : KNOWN_PERSON (k,)
-        People of earlier recordings.
-    """
+    """The input of a run."""
 
     recording: Recording
     config: Config
     tracker: str
+    """The streams, the constants of all stages, and the tracker's name."""
     volume: VolumeKind
+    """The part of the volume that is kept: all of it, the surroundings of tracks, or nothing."""
     first: int
     stop: int
+    """The frames of the run, half open."""
     streams: StreamIndex
+    """Lengths and frame times of the streams (`stseg.io.recording.aligned_stream`)."""
     known: Rows = field(default_factory=lambda: NO_KNOWN_PEOPLE)
+    """KNOWN_PERSON (k,): people of earlier recordings."""
 
     @cached_property
     def read(self) -> Recording:

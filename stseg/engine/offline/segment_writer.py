@@ -28,24 +28,16 @@ _Volumes = list[tuple[PackedFrame, PackedFrame]]
 
 
 class _PendingFrames(NamedTuple):
-    """Committed frames on their way to the file.
-
-    Attributes
-    ----------
-    trajectory : TRAJECTORY (n,)
-        Of the frames of the segment and of its warm-up.
-    results
-        The results of the segment's frames.
-    volumes
-        Their log-odds and labels, packed.
-    events : EVENT (k,)
-        Further events of these frames.
-    """
+    """Committed frames on their way to the file."""
 
     trajectory: Rows
+    """TRAJECTORY (n,): rows of the frames of the segment and of its warm-up."""
     results: CommittedFrames
+    """The results of the segment's frames."""
     volumes: Future[_Volumes]
+    """Their log-odds and labels, packed."""
     events: Rows
+    """EVENT (k,): further events of these frames."""
 
 
 class SegmentWriter(ExitStack):

@@ -23,22 +23,15 @@ _SHORTEST = 3
 
 @dataclass(frozen=True)
 class Segment:
-    """A range of frames of the recording with its warm-up.
-
-    Attributes
-    ----------
-    index
-        Number of the segment in the run, from 0.
-    lead
-        First processed frame; frames lead .. first - 1 are the warm-up.
-    first, stop
-        Committed frames, half open; those of all segments partition the run except for its gaps.
-    """
+    """A range of frames of the recording with its warm-up."""
 
     index: int
+    """Number of the segment in the run, from 0."""
     lead: int
+    """First processed frame; frames lead .. first - 1 are the warm-up."""
     first: int
     stop: int
+    """Committed frames, half open; those of all segments partition the run except for its gaps."""
 
 
 def segments(

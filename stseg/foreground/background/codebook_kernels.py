@@ -25,27 +25,18 @@ _OUTWARDS = np.float32(20)  # times faster than inwards do the bounds move
 
 
 class Codewords(NamedTuple):
-    """The codewords of all pixels of a view.
-
-    Attributes
-    ----------
-    mean : float32 (v, u, K, 3)
-        The colour v, grey levels BGR.
-    bounds : float32 (v, u, K, [low, high])
-        Of the brightness, relative to v.
-    frequency : float32 (v, u, K)
-        Turns; 0 is an empty place.
-    weight : float32 (v, u, K)
-        The frequency of background, at most that of the memory, and 0 in the cache.
-    access : int32 (v, u, K, [first, last])
-        Turns, first 0 for what was learned before the first call of `likelihood`.
-    """
+    """The codewords of all pixels of a view."""
 
     mean: Singles
+    """float32 (v, u, K, 3): the colour v, grey levels BGR."""
     bounds: Singles
+    """float32 (v, u, K, [low, high]): bounds of the brightness, relative to v."""
     frequency: Singles
+    """float32 (v, u, K): turns; 0 is an empty place."""
     weight: Singles
+    """float32 (v, u, K): the frequency of background, at most that of the memory, and 0 in the cache."""
     access: NDArray[np.int32]
+    """int32 (v, u, K, [first, last]): turns, first 0 for what was learned before the first call of `likelihood`."""
 
     @classmethod
     def none(cls, shape: tuple[int, int, int]) -> Self:

@@ -27,16 +27,11 @@ _FARTHEST = 4.0
 
 @dataclass(frozen=True)
 class SizePrior:
-    """Errors and spread of a size before the recording.
-
-    Attributes
-    ----------
-    noise, spread
-        Standard deviations of a frame's error, all of which lasts, and among people.
-    """
+    """Errors and spread of a size before the recording."""
 
     noise: float
     spread: float
+    """Standard deviations of a frame's error, all of which lasts, and among people."""
 
     def errors(self, sizes: int = 1) -> LastingError:
         """The errors of some sizes of this prior."""
@@ -46,18 +41,12 @@ class SizePrior:
 
 @dataclass(frozen=True)
 class MeasuredSizes:
-    """Sizes of the person in each row of a trajectory.
-
-    Attributes
-    ----------
-    value : float64 (n, size)
-        Nan where unmeasured.
-    priors
-        One for each size.
-    """
+    """Sizes of the person in each row of a trajectory."""
 
     value: Floats
+    """float64 (n, size): nan where unmeasured."""
     priors: list[SizePrior]
+    """One for each size."""
 
     @classmethod
     def of_heights(cls, height: Floats, config: Config) -> MeasuredSizes:
@@ -72,25 +61,17 @@ class MeasuredSizes:
 
 @dataclass(frozen=True)
 class SizeModel:
-    """Statistics of each size; all float64 (size,).
-
-    Attributes
-    ----------
-    mean
-        Of the population.
-    variance, row_variance
-        Variance of the error of one row, and that with which each of many rows counts as independent of the others.
-    spread
-        Variance among people; 0 where the size says nothing.
-    most_against
-        Greatest evidence of one independent look for a new person instead of a known one, nats: it may be an outlier.
-    """
+    """Statistics of each size; all float64 (size,)."""
 
     mean: Floats
+    """Of the population."""
     variance: Floats
     row_variance: Floats
+    """Variance of the error of one row, and that with which each of many rows counts as independent of the others."""
     spread: Floats
+    """Variance among people; 0 where the size says nothing."""
     most_against: Floats
+    """Greatest evidence of one independent look for a new person instead of a known one, nats: it may be an outlier."""
 
     @classmethod
     def joined(cls, parts: Sequence[SizeModel]) -> SizeModel:

@@ -15,13 +15,6 @@ _SMOOTHING = 0.6
 class Route:
     """A pedestrian's route: straight lines between timed stops; two stops at one place are a pause.
 
-    Attributes
-    ----------
-    height
-        Body height, metres.
-    stops
-        Seconds from the first frame, x and y in metres; the person is there from the first stop's time to the last's.
-
     Raises
     ------
     ConfigError
@@ -29,7 +22,9 @@ class Route:
     """
 
     height: float
+    """Body height, metres."""
     stops: tuple[tuple[float, float, float], ...]
+    """Seconds from the first frame, x and y in metres; the person is there from the first stop's time to the last's."""
 
     def __post_init__(self) -> None:
         times = [stop[0] for stop in self.stops]

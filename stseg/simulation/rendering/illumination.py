@@ -14,19 +14,6 @@ from stseg.errors import ConfigError
 class Lamp:
     """A change of the illumination.
 
-    Attributes
-    ----------
-    brightness
-        Added light at its place, relative to the room's own; negative to remove light.
-    on, off
-        Start and end, seconds from the first frame.
-    rise
-        Duration of start and end, seconds; 0 for a switch.
-    place
-        x, y, z in metres.
-    reach
-        Distance of half its light, metres; infinite for a uniform change: a cloud, an exposure.
-
     Raises
     ------
     ConfigError
@@ -34,11 +21,16 @@ class Lamp:
     """
 
     brightness: float
+    """Added light at its place, relative to the room's own; negative to remove light."""
     on: float
     off: float = math.inf
+    """Start and end, seconds from the first frame."""
     rise: float = 0.0
+    """Duration of start and end, seconds; 0 for a switch."""
     place: tuple[float, float, float] = (0.0, 0.0, 2.5)
+    """x, y, z in metres."""
     reach: float = math.inf
+    """Distance of half its light, metres; infinite for a uniform change: a cloud, an exposure."""
 
     def __post_init__(self) -> None:
         if not self.brightness > -1:

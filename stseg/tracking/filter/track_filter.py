@@ -77,32 +77,23 @@ class BodyPlace(NamedTuple):
 
 
 class TrackState(NamedTuple):
-    """State of one track at its last detection.
-
-    Attributes
-    ----------
-    track
-        Number, from 1; 0 for a tentative track: a candidate that was rejected, but may be confirmed later.
-    last_seen
-        Frame of the last detection.
-    state, covariance : float64 (6,), (6, 6)
-        x, y, vx, vy in metres and metres per second, and the lasting part of the body's stray, in its own standard
-        deviations (`stseg.tracking.filter.motion_model`).
-    height, height_variance, width, width_variance
-        Metres, square metres.
-    odds
-        Log-odds of existence, nats.
-    """
+    """State of one track at its last detection."""
 
     track: int
+    """Number, from 1; 0 for a tentative track: a candidate that was rejected, but may be confirmed later."""
     last_seen: int
+    """Frame of the last detection."""
     state: Floats
     covariance: Floats
+    """float64 (6,) and (6, 6): x, y, vx, vy in metres and metres per second, and the lasting part of the body's
+    stray, in its own standard deviations (`stseg.tracking.filter.motion_model`)."""
     height: float
     height_variance: float
     width: float
     width_variance: float
+    """Body height and width, metres, and their variances, square metres."""
     odds: float
+    """Log-odds of existence, nats."""
 
     def predicted(self, seconds: float, model: MotionConfig) -> TrackState:
         """The state some seconds after the last detection."""
