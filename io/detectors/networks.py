@@ -34,15 +34,6 @@ class Network:
         The ONNX file.
     by_opencv
         Run by OpenCV; None: only where onnxruntime is not installed.
-
-    Attributes
-    ----------
-    header
-        Inputs, outputs and metadata in the file.
-    size
-        Width and height of the picture, pixels.
-    runtime
-        The library that runs it, and its version.
     """
 
     def __init__(self, path: Path, by_opencv: bool | None = None) -> None:
@@ -50,12 +41,15 @@ class Network:
         data = _read(path)
         try:
             self.header = parse_header(data)
+            """Inputs, outputs and metadata in the file."""
         except ValueError as error:
             raise FormatError(path, "", f"what is no ONNX ({error})", _MODEL) from error
         self.size = self._size()
+        """Width and height of the picture, pixels."""
         self._elements = [one.element for one in self.header.inputs]
         by_opencv = _by_opencv() if by_opencv is None else by_opencv
         self.runtime = runtime(by_opencv)
+        """The library that runs it, and its version."""
         self._run = self._by_opencv(data) if by_opencv else self._by_onnxruntime(data)
 
     def __call__(self, picture: Singles) -> dict[str, Floats]:

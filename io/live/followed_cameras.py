@@ -51,13 +51,6 @@ class FollowedCameras(AbstractContextManager["FollowedCameras"], Iterator[FrameS
     connect
         Opens a stream.
 
-    Attributes
-    ----------
-    start
-        Time of frame 0; None before the first frame set.
-    dropped
-        Number of frame sets whose observations were dropped.
-
     Raises
     ------
     SourceError
@@ -75,6 +68,7 @@ class FollowedCameras(AbstractContextManager["FollowedCameras"], Iterator[FrameS
     ) -> None:
         rig = recording.rig
         self.start, self.dropped = start, 0
+        """Time of frame 0, None before the first frame set; number of frame sets whose observations were dropped."""
         self._halt, self._report, self._config = halt, report, config
         self._period = 1 / rig.frame_rate
         self._stale = max(config.frame_tolerance, 0.75 * self._period)

@@ -27,11 +27,6 @@ class LiveTable:
 
     Lines of an unfinished run in the file are kept, those of frames from `stop` on removed. Raises OutputError where it
     cannot be written, from every method.
-
-    Attributes
-    ----------
-    rows : TRAJECTORY (n,)
-        The kept lines: frame, id, x, y.
     """
 
     def __init__(self, path: Path, frame_rate: float, stop: int) -> None:
@@ -39,6 +34,7 @@ class LiveTable:
         lines = _whole_lines(path, stop, len(_COLUMNS), {0: limits.FRAMES, 2: _IDS})
         lines = [line for line in lines if _has_numbers(line)]
         self.rows = np.zeros(len(lines), TRAJECTORY)
+        """TRAJECTORY (n,): frame, id, x, y of the kept lines."""
         for name in ("frame", "id", "x", "y"):
             self.rows[name] = [parse_number(line[_COLUMNS.index(name)]) for line in lines]
         _rewrite(path, _COLUMNS, lines)
@@ -72,17 +68,13 @@ class CorrectionTable:
 
     Lines of an unfinished run in the file are kept, those decided with frames from `stop` on removed. Raises
     OutputError where it cannot be written, from every method.
-
-    Attributes
-    ----------
-    rows : CORRECTION (n,)
-        The kept lines.
     """
 
     def __init__(self, path: Path, stop: int) -> None:
         self.path = path
         lines = _whole_lines(path, stop, len(COLUMNS), dict(enumerate((*(limits.FRAMES,) * 3, _IDS, _IDS))))
         self.rows = np.array([tuple(map(int, line)) for line in lines], CORRECTION)
+        """CORRECTION (n,): the kept lines."""
         if lines:
             _rewrite(path, COLUMNS, lines)
         else:

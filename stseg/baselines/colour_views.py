@@ -11,18 +11,12 @@ from stseg.trackers.protocol import FrameObservations
 
 
 class ColourView(NamedTuple):
-    """A colour image and its foreground.
-
-    Attributes
-    ----------
-    image : uint8 (v, u, 3)
-        BGR.
-    likelihood : float32 (v, u)
-        Of foreground, 0..1.
-    """
+    """A colour image and its foreground."""
 
     image: Bytes
+    """uint8 (v, u, 3): BGR."""
     likelihood: Singles
+    """float32 (v, u): of foreground, 0..1."""
 
 
 def colour_views(observed: FrameObservations, tracker: str, frame: int) -> list[ColourView | None]:

@@ -60,16 +60,12 @@ class IlluminationMonitor:
         Frames per second at which `likelihood` is called.
     config
         Thresholds of a change.
-
-    Attributes
-    ----------
-    changes
-        All changes so far.
     """
 
     def __init__(self, model: Background, frame_rate: float, config: IlluminationConfig | None = None) -> None:
         self.model = model
         self.changes: list[LightChange] = []
+        """All changes so far."""
         self._config = IlluminationConfig() if config is None else config
         self._window = max(1, round(self._config.change_time * frame_rate))
         self._patience = max(1, round(self._config.blind_time * frame_rate))

@@ -112,21 +112,16 @@ class Moves:
     ----------
     energy, start, cut
         As of `expand`.
-
-    Attributes
-    ----------
-    labels : int64 (n,)
-        Current labelling.
-    alphabet
-        All labels, ascending, the background first.
     """
 
     def __init__(self, energy: LabelEnergy, start: Ints, cut: Callable[..., Flags] = sparse_cut) -> None:
         self._cut = cut
         self.labels = start.astype(np.int64)
+        """int64 (n,): current labelling."""
         self._cost = unary_costs(energy, self.labels)
         self._cells_by_label = _cells_by_label(energy)
         self.alphabet = sorted(self._cells_by_label)
+        """All labels, ascending, the background first."""
         cells, edges = energy.cells, len(energy.start)
         self._adjacency = Neighbours(
             np.zeros(cells + 1, np.int64), np.empty(2 * edges, np.int64), np.empty(2 * edges, np.int64)

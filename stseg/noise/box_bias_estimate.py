@@ -53,16 +53,12 @@ class BoxBiasEstimate:
         Frames per second.
     config
         How fast is forgotten, and from which evidence on people count.
-
-    Attributes
-    ----------
-    offsets : (2,)
-        Information, boxes, and the bias times it, shares of the height; both times seconds.
     """
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
         self._config = config
         self.offsets = Forgetting((2,), frame_rate, config.memory)
+        """(2,): information, boxes, and the bias times it, shares of the height; both times seconds."""
         self._corrected = 0.0
 
     @property

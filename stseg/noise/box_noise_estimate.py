@@ -46,16 +46,13 @@ class BoxNoiseEstimate:
         Frames per second.
     scale
         That of `BoxNoise`.
-
-    Attributes
-    ----------
-    offsets : (knot, 6)
-        Boxes, and their squared offsets, of the lower edge on either side of the feet; both times seconds.
     """
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig, scale: float = 1.0) -> None:
         self._config, self._scale = config, scale
         self.offsets = Forgetting((len(SCORE_KNOTS), 6), frame_rate, config.memory)
+        """(knot, 6): boxes, and their squared offsets, of the lower edge on either side of the feet; both times
+        seconds."""
 
     @property
     def noise(self) -> BoxNoise:

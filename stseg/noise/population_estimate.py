@@ -36,16 +36,13 @@ class PopulationEstimate:
         Frames per second.
     config
         How fast is forgotten, and from which evidence on people count.
-
-    Attributes
-    ----------
-    moments : (2, 3)
-        Of height and relative width: weight, and weighted sums of the size and its square; seconds, metres.
     """
 
     def __init__(self, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
         self._first, self._config = body, config
         self.moments = Forgetting((2, 3), frame_rate, config.memory)
+        """(2, 3): of height and relative width: weight, and weighted sums of the size and its square; seconds,
+        metres."""
 
     @property
     def body(self) -> BodyConfig:

@@ -58,13 +58,6 @@ class RimEstimate:
         Frames per second.
     learning
         Memory, and least evidence of people who count.
-
-    Attributes
-    ----------
-    shares : (view, 3)
-        Weight, and weighted sums of the shares of bodies that are missing, and background on the rim; seconds.
-    clutter : (view, 2)
-        Weight, and weighted sums of the share of pixels away from people that are foreground; seconds.
     """
 
     def __init__(
@@ -73,7 +66,10 @@ class RimEstimate:
         self._body, self._evidence = body, learning.minimum_evidence
         self._miss, self._clutter = config.pixel_miss_rate, config.pixel_clutter_rate
         self.shares = Forgetting((views, 3), frame_rate, learning.memory)
+        """(view, 3): weight, and weighted sums of the shares of bodies that are missing, and background on the rim;
+        seconds."""
         self.clutter = Forgetting((views, 2), frame_rate, learning.memory)
+        """(view, 2): weight, and weighted sums of the share of pixels away from people that are foreground; seconds."""
 
     @property
     def withdrawn(self) -> Floats:

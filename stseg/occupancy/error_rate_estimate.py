@@ -49,24 +49,18 @@ class ErrorRateEstimate:
         First guess of each view.
     frame_rate
         Frames per second.
-
-    Attributes
-    ----------
-    counts : (2, view, 3)
-        Trials and errors of each rate in `ErrorRates`, in seconds: of one person's cells for m and b', of all the
-        view's cells for b.
-    filled : (2,)
-        Seconds of one person's cells: all within reach of the person, and those that the pillar fills.
-    interval : int
-        Frames from one counted frame to the next.
     """
 
     def __init__(self, first: Sequence[ErrorRates], frame_rate: float, config: ErrorRateConfig) -> None:
         self.first = np.array(first, float).reshape(-1, 3)
         self.config = config
         self.counts = Forgetting((2, *self.first.shape), frame_rate, config.memory)
+        """(2, view, 3): trials and errors of each rate in `ErrorRates`, in seconds: of one person's cells for m and b',
+        of all the view's cells for b."""
         self.filled = Forgetting((2,), frame_rate, config.memory)
+        """(2,): seconds of one person's cells: all within reach of the person, and those that the pillar fills."""
         self.interval = max(1, round(_INTERVAL * frame_rate))
+        """Frames from one counted frame to the next."""
         self._frames = 0
 
     @property

@@ -86,15 +86,6 @@ class CellTables:
     ----------
     footprint : int16 (view, plane, y, x, 4)
         See `stseg.geometry.sampling`.
-
-    Attributes
-    ----------
-    ground : int64 (place,), ground_start : int64 (block of one plane,)
-        The ground cells in block order, as indices in the flattened ground, and the first of each block.
-    footprint : int16 (view, cell, 4), place, in_volume : int32 (cell,)
-        Of the cells that a view sees, in block order; see `ShownCells`.
-    reach : of each view
-        See `Reach`.
     """
 
     def __init__(self, footprint: Footprints) -> None:
@@ -102,14 +93,19 @@ class CellTables:
         y, x = np.indices((rows, columns)) // BLOCK_SIDE
         block = (y * columns + x).reshape(-1)
         self.ground = np.argsort(block, kind="stable")
+        """int64 (place,): the ground cells in block order, as indices in the flattened ground."""
         self.ground_start = np.unique(block[self.ground], return_index=True)[1]
+        """int64 (block of one plane,): the first ground cell of each block."""
         first = np.arange(planes)[:, None] * len(self.ground)
         start, order = (first + self.ground_start).reshape(-1), (first + self.ground).reshape(-1)
         views = footprint.reshape(len(footprint), -1, 4)
         self.reach = [_reach(boxes[order], start) for boxes in views]
+        """One for each view."""
         is_seen = np.logical_or.reduce(views[..., 2] > 0)[order]
         self.in_volume, place = order[is_seen].astype(np.int32), np.flatnonzero(is_seen) % len(self.ground)
         self.footprint, self.place = views.take(self.in_volume, 1), place.astype(np.int32)
+        """int16 (view, cell, 4) and int32 (cell,), as `in_volume` (see `ShownCells`): of the cells that a view sees,
+        in block order."""
         self._width = np.add.reduceat(is_seen, start, dtype=np.int64)  # cells of each block
         self._first = (self._width.cumsum() - self._width).astype(np.int32)
         self._marked, self._cells = self.nothing_marked(), self._cells_of(self.nothing_marked())

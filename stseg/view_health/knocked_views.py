@@ -68,22 +68,16 @@ class KnockedViews:
         Frames per second.
     config
         Memory of the share that a view usually shows.
-
-    Attributes
-    ----------
-    knocked : bool (view,)
-        Whether each view is.
-    usual : (view, 3)
-        Frames with people, and sums of the mean share of them that views show, and of its square.
-    recent : (view, 2)
-        People, and sum of the gains of the best shift while a view is knocked.
     """
 
     def __init__(self, views: int, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
         self._body, self._usual_frames = body, max(_USUAL_TIME * frame_rate, _USUAL_FRAMES)
         self.knocked = np.zeros(views, bool)
+        """bool (view,): whether each view is knocked."""
         self.usual = Forgetting((views, 3), frame_rate, config.memory)
+        """(view, 3): frames with people, and sums of the mean share of them that views show, and of its square."""
         self.recent = Forgetting((views, 2), frame_rate, _RECENT_MEMORY, _RECENT_FRAMES)
+        """(view, 2): people, and sum of the gains of the best shift while a view is knocked."""
 
     def compare(
         self, predicted: PredictedTracks, views: Sequence[DetectorView], observations: ViewObservations

@@ -74,35 +74,25 @@ class ViewFailures:
         Frames per second.
     config
         Memory, and least evidence of people who count.
-
-    Attributes
-    ----------
-    failing : bool (view,)
-        Views whose informedness is too small.
-    knocks
-        Views that show people beside their places.
-    excluded : bool (view,)
-        Views that are excluded from the last frame.
-    usual : (view, 2)
-        Weight, and weighted sum of the informedness; seconds of one person.
-    recent : one (view, 2) for each span
-        The same.
-    deviation : one (view, 2) for each span
-        Weight, and weighted sum of squared deviations, each times the number of measurements; seconds.
-    doubtful_usual, doubtful_deviation : (view, 2), (view, span, 2)
-        What is to be added to these since the informedness is low.
     """
 
     def __init__(self, views: int, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
         self._rate, self._config = frame_rate, config
         self.failing, self.excluded = np.zeros(views, bool), np.zeros(views, bool)
+        """bool (view,): views whose informedness is too small, and those that are excluded from the last frame."""
         self.knocks = KnockedViews(views, body, frame_rate, config)
+        """Views that show people beside their places."""
         self.usual = Forgetting((views, 2), frame_rate, config.memory)
+        """(view, 2): weight, and weighted sum of the informedness; seconds of one person."""
         self.recent = [
             Forgetting((views, 2), frame_rate, span, frames) for span, frames in zip(_SPANS, _SPAN_FRAMES, strict=True)
         ]
+        """The same for each span."""
         self.deviation = [Forgetting((views, 2), frame_rate, config.memory) for _ in _SPANS]
+        """(view, 2) for each span: weight, and weighted sum of squared deviations, each times the number of
+        measurements; seconds."""
         self.doubtful_usual, self.doubtful_deviation = np.zeros((views, 2)), np.zeros((views, len(_SPANS), 2))
+        """(view, 2) and (view, span, 2): what is to be added to these since the informedness is low."""
         self._frames = np.zeros(views, np.int64)
 
     def kept(self, inputs: Sequence[ViewInput]) -> list[ViewInput | None]:

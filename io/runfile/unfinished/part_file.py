@@ -29,11 +29,6 @@ class PartFile(io.RawIOBase):
     ----------
     path
         The output whose part this is. Parts of killed processes are deleted.
-
-    Attributes
-    ----------
-    part
-        The temporary file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -143,6 +138,7 @@ class PartFile(io.RawIOBase):
     def _create(self) -> io.FileIO:
         _remove_abandoned(self._path)
         self.part, descriptor = create_part(self._path)
+        """The temporary file."""
         file = os.fdopen(descriptor, "r+b", buffering=0)
         try:
             lock(file)

@@ -22,15 +22,6 @@ class Leaf:
         Predicted ground point of the target, metres: the scale of its foot noise in pixels follows from it.
     count
         Number of particles.
-
-    Attributes
-    ----------
-    place : float64 (m, 2)
-        The particles, ideal pixels.
-    mapped, covariance : float64 (m, 2), (m, 2, 2)
-        The same on the ground, metres, square metres.
-    belief, visible_belief : float64 (m,)
-        Weights of the belief before any message, whose sum is 1; and the part of each for a visible target.
     """
 
     def __init__(self, likelihood: TargetLikelihood, prior: Prediction, place: Floats, count: int) -> None:
@@ -39,8 +30,12 @@ class Leaf:
         tall = box[3] - box[1]
         self.noise = likelihood.config.foot_noise * float(tall if np.isfinite(tall) else likelihood.view.camera.size[1])
         self.place = self.mapped = np.zeros((0, 2))
+        """float64 (m, 2): the particles, ideal pixels."""
         self.covariance = np.zeros((0, 2, 2))
+        """float64 (m, 2), (m, 2, 2): the same on the ground, metres, square metres."""
         self.belief = self.visible_belief = np.zeros(0)
+        """float64 (m,): weights of the belief before any message, whose sum is 1; and the part of each for a visible
+        target."""
 
     def follow(self, rng: np.random.Generator) -> None:
         """Draw the particles from the view's own prediction."""

@@ -12,19 +12,13 @@ from stseg.kernels.accelerate import kernel
 
 @dataclass(frozen=True)
 class Particles:
-    """A node's belief; places are metres on the ground or pixels of the ideal image, as the node's are.
-
-    Attributes
-    ----------
-    place, velocity : float64 (n, 2)
-        Velocities are of one second.
-    weight : float64 (n,)
-        Their sum is 1.
-    """
+    """A node's belief; places are metres on the ground or pixels of the ideal image, as the node's are."""
 
     place: Floats
     velocity: Floats
+    """float64 (n, 2) each; velocities are of one second."""
     weight: Floats
+    """float64 (n,): their sum is 1."""
 
     def __len__(self) -> int:
         return len(self.place)
@@ -43,21 +37,14 @@ class Particles:
 
 @dataclass(frozen=True)
 class Motion:
-    """Process noise of a constant-velocity model over one frame.
-
-    Attributes
-    ----------
-    seconds
-        Length of a frame.
-    position_noise
-        Standard deviation of the place, metres per square root of a second.
-    velocity_noise
-        Standard deviation of the velocity, metres per second per square root of a second.
-    """
+    """Process noise of a constant-velocity model over one frame."""
 
     seconds: float
+    """Length of a frame."""
     position_noise: float
+    """Standard deviation of the place, metres per square root of a second."""
     velocity_noise: float
+    """Standard deviation of the velocity, metres per second per square root of a second."""
 
     @property
     def place_variance(self) -> float:
@@ -77,23 +64,17 @@ class Motion:
 
 @dataclass(frozen=True)
 class Prediction:
-    """The integrals over the last frame in Du and Piater 2006, equations 8 to 11: a mixture of one Gaussian a particle.
-
-    Attributes
-    ----------
-    centre, velocity : float64 (n, 2), weight : float64 (n,)
-        Predicted places, velocities and weights of the particles: the Gaussians' centres.
-    axes : float64 (2, 2)
-        Jacobian from ground metres to the node's own units; the unit matrix on the ground.
-    motion
-        Process noise: the Gaussians' spread.
-    """
+    """The integrals over the last frame in Du and Piater 2006, equations 8 to 11: one Gaussian for each particle."""
 
     centre: Floats
     velocity: Floats
+    """float64 (n, 2) each: predicted places, which are the Gaussians' centres, and velocities."""
     weight: Floats
+    """float64 (n,): weights of the particles."""
     axes: Floats
+    """float64 (2, 2): jacobian from ground metres to the node's own units; the unit matrix on the ground."""
     motion: Motion
+    """Process noise: the Gaussians' spread."""
 
     @classmethod
     def of(cls, particles: Particles, axes: Floats, motion: Motion) -> Prediction:

@@ -21,21 +21,14 @@ from stseg.kernels.accelerate import kernel
 
 @dataclass(frozen=True)
 class Outlier:
-    """The outlier term of eq. 12: the target is not where the view's belief is.
-
-    Attributes
-    ----------
-    share
-        lambda.
-    mean : float64 (2,)
-        mu, metres.
-    spread
-        Standard deviation along both axes, metres: Lambda is its square times the unit matrix.
-    """
+    """The outlier term of eq. 12: the target is not where the view's belief is."""
 
     share: float
+    """lambda."""
     mean: Floats
+    """float64 (2,): mu, metres."""
     spread: float
+    """Standard deviation along both axes, metres: Lambda is its square times the unit matrix."""
 
     @property
     def flat(self) -> float:
@@ -50,21 +43,14 @@ class Outlier:
 
 @dataclass(frozen=True)
 class Potential:
-    """The potential psi between ground particles and a view's particles.
-
-    Attributes
-    ----------
-    inlier : float64 (n, m)
-        N(g_n; H^-1 x_m, Gamma_m), 1/square metre.
-    stray : float64 (n,)
-        The outlier term's density at each ground particle.
-    outlier
-        The outlier term.
-    """
+    """The potential psi between ground particles and a view's particles."""
 
     inlier: Floats
+    """float64 (n, m): N(g_n; H^-1 x_m, Gamma_m), 1/square metre."""
     stray: Floats
+    """float64 (n,): the outlier term's density at each ground particle."""
     outlier: Outlier
+    """The outlier term."""
 
     @classmethod
     def of(cls, ground: Floats, mapped: Floats, covariance: Floats, outlier: Outlier) -> Potential:

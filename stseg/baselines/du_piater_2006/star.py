@@ -34,21 +34,14 @@ LEAST_ROUNDS = 2
 
 @dataclass(frozen=True)
 class Star:
-    """One target's beliefs in one frame.
-
-    Attributes
-    ----------
-    ground
-        Metres.
-    views
-        Ideal pixels; None where a view does not follow the target.
-    visibility : float64 (view,)
-        Probability that each view sees it.
-    """
+    """One target's beliefs in one frame."""
 
     ground: Particles
+    """Metres."""
     views: tuple[Particles | None, ...]
+    """Ideal pixels; None where a view does not follow the target."""
     visibility: Floats
+    """float64 (view,): probability that each view sees it."""
 
     def place(self, j: int, view: StarView, prediction: Prediction) -> Floats:
         """Place predicted by view j if it follows the target, else by the ground, metres, float64 (2,)."""

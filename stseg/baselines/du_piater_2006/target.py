@@ -23,28 +23,19 @@ _INSIDE = 0.5
 
 @dataclass
 class Target:
-    """A tracked person.
-
-    Attributes
-    ----------
-    track
-        Its track id.
-    star
-        Its beliefs on the ground and in the views.
-    height
-        Metres.
-    colours
-        For each view float64 (part, bin), or None where the target was never fully visible.
-    found, missed
-        Frames with a detection assigned to it, and frames since the last of them.
-    """
+    """A tracked person."""
 
     track: int
+    """Its track id."""
     star: Star
+    """Its beliefs on the ground and in the views."""
     height: float
+    """Metres."""
     colours: list[Floats | None]
+    """For each view float64 (part, bin), or None where the target was never fully visible."""
     found: int = 1
     missed: int = 0
+    """Frames with a detection assigned to it, and frames since the last of them."""
 
     @classmethod
     def at(

@@ -18,29 +18,20 @@ class TargetLikelihood:
     and the learned one (the sum is their Bhattacharyya coefficient), averaged over the parts of the body. What a nearer
     person hides, or lies beyond the image, is uninformative: its D^2 is `belief.neutral_distance`. A target that is not
     visible at all is a case of its own, of the same D^2.
-
-    Attributes
-    ----------
-    view
-        The view.
-    image : uint8 (v, u, 3)
-        Its frame: blue, green, red.
-    reference : float64 (part, bin)
-        The target's colours.
-    height
-        The target's height, metres.
-    nearer : float64 (k, 4)
-        Boxes of people in front of the target.
-    config
-        The constants.
     """
 
     view: StarView
+    """The view."""
     image: Bytes
+    """uint8 (v, u, 3): its frame: blue, green, red."""
     reference: Floats
+    """float64 (part, bin): the target's colours."""
     height: float
+    """The target's height, metres."""
     nearer: Floats
+    """float64 (k, 4): boxes of people in front of the target."""
     config: BeliefConfig
+    """The constants."""
 
     @property
     def hidden(self) -> float:

@@ -19,23 +19,16 @@ class StarView:
     """One view.
 
     Particles in it are pixels of the ideal image, in which the homography is exact; boxes are pixels of the real one.
-
-    Attributes
-    ----------
-    camera
-        The view.
-    table
-        Boxes of people in it.
-    inverse : float64 (3, 3)
-        Homography from ideal pixels to the ground.
-    centre : float64 (2,)
-        Ground point below the camera, metres.
     """
 
     camera: Camera
+    """The view."""
     table: BodyTable
+    """Boxes of people in it."""
     inverse: Floats
+    """float64 (3, 3): homography from ideal pixels to the ground."""
     centre: Floats
+    """float64 (2,): ground point below the camera, metres."""
 
     @classmethod
     def of(cls, camera: Camera, grid: Grid) -> StarView:

@@ -43,11 +43,6 @@ class DetectionProbability:
         The paper's constants; sizes of people.
     steps
         Image pixels to a map pixel, for each view; 1 where not given.
-
-    Attributes
-    ----------
-    ground : float64 (y, x, 2)
-        The lattice, metres, `spacing` apart.
     """
 
     def __init__(self, rig: Rig, config: ProposalConfig, body: BodyConfig, steps: Sequence[int] | None = None) -> None:
@@ -55,6 +50,7 @@ class DetectionProbability:
         grid = rig.grid
         x, y = (np.arange(a + config.lattice_spacing / 2, b, config.lattice_spacing) for a, b in (grid.x, grid.y))
         self.ground = np.stack(np.meshgrid(x, y), -1)
+        """float64 (y, x, 2): the lattice, metres, `spacing` apart."""
         flat = self.ground.reshape(-1, 2)
         self.inside = np.ones(len(flat), bool) if grid.polygon is None else inside_polygon(flat, grid.polygon)
         self.heights, self.height_share = _lattice(body.height_mean, body.height_spread, config.body_sizes)

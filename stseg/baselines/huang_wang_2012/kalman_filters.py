@@ -18,17 +18,12 @@ from stseg.tracking.filter.motion_model import process_noise, transition
 
 
 class Filters(NamedTuple):
-    """Filters of n people.
-
-    Attributes
-    ----------
-    state : float64 (n, 4)
-        x, y, vx, vy in metres and metres per second.
-    covariance : float64 (n, 4, 4)
-    """
+    """Filters of n people."""
 
     state: Floats
+    """float64 (n, 4): x, y, vx, vy in metres and metres per second."""
     covariance: Floats
+    """float64 (n, 4, 4): its errors."""
 
     def __len__(self) -> int:
         return len(self.state)

@@ -28,22 +28,16 @@ _MODE_RADIUS = 0.25
 
 
 class Modes(NamedTuple):
-    """Modes, heaviest first.
-
-    Attributes
-    ----------
-    ground : float64 (n, 2), covariance : float64 (n, 2, 2)
-        Means and covariances of the samples, metres and square metres.
-    peak : float64 (n, 2)
-        Where the samples met, metres.
-    weight : float64 (n,)
-        Sum of the samples' weights.
-    """
+    """Modes, heaviest first."""
 
     ground: Floats
+    """float64 (n, 2): means of the samples, metres."""
     covariance: Floats
+    """float64 (n, 2, 2): their covariances, square metres."""
     peak: Floats
+    """float64 (n, 2): where the samples met, metres."""
     weight: Floats
+    """float64 (n,): sum of the samples' weights."""
 
     def __len__(self) -> int:
         return len(self.ground)

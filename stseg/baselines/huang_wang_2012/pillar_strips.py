@@ -33,26 +33,19 @@ class PillarStrips:
     """Strips of the pillars of one view.
 
     Image coordinates are those of edges, not of pixel centres: a map pixel i spans i .. i + 1.
-
-    Attributes
-    ----------
-    upright : bool (place,)
-        Whether the strips are rows of the image; columns otherwise.
-    edge : float32 (place, strip + 1)
-        Where they meet, from the feet up: rows of the map, or columns. nan where the view does not see the pillar.
-    middle : float32 (place, strip)
-        Where the axis is in a strip: columns of the map, or rows.
-    half : float32 (place, strip)
-        Half of the strip's width for each metre of the pillar's, map pixels a metre.
-    base
-        The strip of the least height, from 0: those above it each end at one height more.
     """
 
     upright: Flags
+    """bool (place,): whether the strips are rows of the image; columns otherwise."""
     edge: Singles
+    """float32 (place, strip + 1): where they meet, from the feet up: rows of the map, or columns. nan where the view
+    does not see the pillar."""
     middle: Singles
+    """float32 (place, strip): where the axis is in a strip: columns of the map, or rows."""
     half: Singles
+    """float32 (place, strip): half of the strip's width for each metre of the pillar's, map pixels a metre."""
     base: int
+    """The strip of the least height, from 0: those above it each end at one height more."""
 
     @classmethod
     def of(

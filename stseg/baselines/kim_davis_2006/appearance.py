@@ -18,21 +18,14 @@ _FEWEST = 20
 
 @dataclass(frozen=True)
 class PersonAppearance:
-    """The colours of one person.
-
-    Attributes
-    ----------
-    samples : uint8 (part, SAMPLES, 3)
-        As `colours.normalised` returns them.
-    counts : int64 (part,)
-        Number of valid samples of each part.
-    reference : float64 (part, bin)
-        q* of eq. 7: their histograms; 0 where there are too few samples.
-    """
+    """The colours of one person."""
 
     samples: Bytes
+    """uint8 (part, SAMPLES, 3): as `colours.normalised` returns them."""
     counts: Ints
+    """int64 (part,): number of valid samples of each part."""
     reference: Floats
+    """float64 (part, bin): q* of eq. 7: their histograms; 0 where there are too few samples."""
 
     @classmethod
     def unknown(cls) -> PersonAppearance:

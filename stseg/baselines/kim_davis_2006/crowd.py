@@ -12,29 +12,20 @@ from stseg.baselines.kim_davis_2006.appearance import PersonAppearance
 
 @dataclass(frozen=True)
 class Crowd:
-    """Tracked people.
-
-    Attributes
-    ----------
-    ids, last_detection : int64 (n,)
-        Track ids, and the last frame in which each was detected.
-    height : float64 (n,)
-        Metres.
-    ground, covariance : float64 (n, 2), (n, 2, 2)
-        Estimate of the last frame, metres.
-    particles : float64 (particle, n, 2)
-        Joint hypotheses of all places, metres.
-    appearances
-        Colour model of each person.
-    """
+    """Tracked people."""
 
     ids: Ints
     last_detection: Ints
+    """int64 (n,) each: track ids, and the last frame in which each was detected."""
     height: Floats
+    """float64 (n,): metres."""
     ground: Floats
     covariance: Floats
+    """float64 (n, 2) and (n, 2, 2): estimate of the last frame, metres."""
     particles: Floats
+    """float64 (particle, n, 2): joint hypotheses of all places, metres."""
     appearances: tuple[PersonAppearance, ...]
+    """Colour model of each person."""
 
     @classmethod
     def empty(cls, particles: int) -> Crowd:

@@ -20,22 +20,15 @@ NO_PERSON = -1
 
 
 class Canvas(NamedTuple):
-    """Buffers for the segmentation of one view; only boxes around people are kept up to date.
-
-    Attributes
-    ----------
-    label : int32 (v, u)
-        The likeliest person, UNASSIGNED for none.
-    best, total : float32 (v, u)
-        P(k) P(x | k) of that person, and the sum over all people.
-    free : float32 (v, u)
-        Probability that no person processed so far covers the pixel.
-    """
+    """Buffers for the segmentation of one view; only boxes around people are kept up to date."""
 
     label: Labels
+    """int32 (v, u): the likeliest person, UNASSIGNED for none."""
     best: Singles
     total: Singles
+    """float32 (v, u) each: p(k) P(x | k) of that person, and the sum over all people."""
     free: Singles
+    """float32 (v, u): probability that no person processed so far covers the pixel."""
 
     @classmethod
     def of(cls, rows: int, columns: int) -> Canvas:

@@ -76,27 +76,21 @@ class ParticleView:
 
 @dataclass(frozen=True)
 class ParticleFrame:
-    """One view of one frame.
-
-    Attributes
-    ----------
-    height : float64 (n,)
-        Heights of the people, metres.
-    colour : uint8 (v, u, 3), bins : int32 (v, u), foreground : uint8 (v, u)
-        Normalised colour, histogram bin and foreground of each pixel of the raster.
-    boxes : int64 (n, 4)
-        Search region of each person, see `bodies.fill_boxes`.
-    density : float32 (n, part, v, u)
-        Eq. 1 of each person's parts.
-    """
+    """One view of one frame."""
 
     view: ParticleView
     height: Floats
+    """float64 (n,): heights of the people, metres."""
     colour: Bytes
+    """uint8 (v, u, 3): normalised colour of each pixel of the raster."""
     bins: Labels
+    """int32 (v, u): its histogram bin."""
     foreground: Bytes
+    """uint8 (v, u): its foreground."""
     boxes: Ints
+    """int64 (n, 4): search region of each person, see `bodies.fill_boxes`."""
     density: Singles
+    """float32 (n, part, v, u): eq. 1 of each person's parts."""
 
     def segment(self, ground: Floats) -> tuple[Floats, Ints]:
         """Label the view's canvas by a hypothesis (n, 2); the bodies, and their order of occlusion."""

@@ -54,11 +54,6 @@ class LiveRun:
         Foreground models of the cameras.
     finished
         Finished segments of an interrupted run; those of this run are appended.
-
-    Attributes
-    ----------
-    pipeline
-        The stages, shared by all segments.
     """
 
     def __init__(
@@ -81,6 +76,7 @@ class LiveRun:
         self._decided_again = LiveCorrections(frame_rate, Border.of(job.read.reduced_rig), job.config)
         self._blind_views = BlindViews([camera.name for camera in job.recording.rig.cameras])
         self.pipeline = job.pipeline()
+        """The stages, shared by all segments."""
         self._opened: list[OpenSegment] = []
         self._plan: Iterator[Segment] = iter(())
         self._coming: Segment | None = None
@@ -210,23 +206,17 @@ class OpenSegment:
         Foreground model of each camera, owned by this segment.
     draft
         Path of the unfinished file.
-
-    Attributes
-    ----------
-    session
-        The stages, by which its frame sets are processed.
-    warm_up : list of TRAJECTORY (n,)
-        Rows of the warm-up.
-    names
-        The run's ids of the segment's tracks; None during the warm-up.
     """
 
     def __init__(
         self, job: Job, segment: Segment, pipeline: Pipeline, foregrounds: list[ViewForeground], draft: Path
     ) -> None:
         self.segment, self.warm_up = segment, list[Rows]()
+        """The segment, and TRAJECTORY rows (n,) of its warm-up."""
         self.names: Names | None = None
+        """The run's ids of the segment's tracks; None during the warm-up."""
         self.session = Session(pipeline, foregrounds, segment.lead, job.read.factors)
+        """The stages, by which its frame sets are processed."""
         self._writer = SegmentWriter(job, segment, pipeline.occupancy.views, draft)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []
         """Steps beyond the planned end; part of this segment only if it is the last of the run."""

@@ -25,16 +25,12 @@ class SegmentWorker:
         The run.
     cores
         Processor cores for this worker, asked at each frame; see `run_session`.
-
-    Attributes
-    ----------
-    ends
-        Frames beyond which no segment before them is read, rising.
     """
 
     def __init__(self, job: Job, cores: Callable[[], int] = two_cores) -> None:
         self.job, self.pipeline, self.cores = job, job.pipeline(), cores
         self.ends = [*(begin for begin, _ in job.gaps()), job.stop]
+        """Frames beyond which no segment before them is read, rising."""
         self._learned = list[ViewForeground]()
         self._learned_from: BackgroundFrames | None = None
 
