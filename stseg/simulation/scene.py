@@ -41,7 +41,7 @@ class SceneSpec:
     camera_height: float = 2.8
     """From the area's centre along the ground, and above it, metres; each camera is a little off."""
     field_of_view: float = 66.0
-    """Of the ideal image along its width, degrees."""
+    """Angle of the ideal image along its width, degrees."""
     size: tuple[int, int] = (480, 360)
     """Width and height of the images, pixels."""
     distortion: tuple[float, ...] = (-0.22, 0.05, 0.001, -0.001)

@@ -64,7 +64,7 @@ class SizeModel:
     """Statistics of each size; all float64 (size,)."""
 
     mean: Floats
-    """Of the population."""
+    """Mean of the population."""
     variance: Floats
     row_variance: Floats
     """Variance of the error of one row, and that with which each of many rows counts as independent of the others."""
