@@ -4,7 +4,8 @@ Everything is drawn from projections of points in space, with nothing of the tab
 rows of x, y and height in metres, float64 (n, 3).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 
 import cv2
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 from reference_core import best_pairs
 
 from stseg import Boxes, Camera, Config, FrameSet, Grid, Lens, Rig
-from stseg.arrays import Bytes, Floats, Rows, Singles, ViewEvidence
+from stseg.arrays import Bytes, Floats, Observation, Rows, Singles, ViewEvidence
 from stseg.bodies.pillars import PROFILE, SILHOUETTE
 from stseg.config import BodyConfig, DetectionConfig
 from stseg.detection.detector import Detector
@@ -210,15 +211,13 @@ def standing_at(truth: Rows, frame: int) -> Floats:
     return np.column_stack([own["x"], own["y"], own["height"].astype(float)])
 
 
-def mask_frame_sets(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[FrameSet]:
-    """Frames first .. stop - 1 as masks of all cameras."""
+def _frame_sets(
+    shown: Callable[[Camera, Floats], Observation], rig: Rig, truth: Rows, first: int, stop: int
+) -> Iterator[FrameSet]:
     for frame in range(first, stop):
         standing = standing_at(truth, frame)
-        yield FrameSet(frame, tuple(mask(camera, standing) for camera in rig.cameras))
+        yield FrameSet(frame, tuple(shown(camera, standing) for camera in rig.cameras))
 
 
-def box_frame_sets(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[FrameSet]:
-    """Frames first .. stop - 1 as boxes of all cameras."""
-    for frame in range(first, stop):
-        standing = standing_at(truth, frame)
-        yield FrameSet(frame, tuple(boxes(camera, standing) for camera in rig.cameras))
+mask_frame_sets, box_frame_sets = partial(_frame_sets, mask), partial(_frame_sets, boxes)
+"""Frames first .. stop - 1 as masks, and as boxes, of all cameras."""

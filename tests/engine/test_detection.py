@@ -11,7 +11,7 @@ from typing import Any
 import detector_models
 import numpy as np
 import pytest
-from checks import Command, compiled_only
+from checks import Command, cases, compiled_only
 from films import regular, write_at_rate, write_stamped
 from recordings import assert_same, track
 from scenes import SIZE, body_box, corner_cameras, mask, rig_of
@@ -212,28 +212,19 @@ def test_time_stamps_of_the_videos_count(room: Path, stdout: Command, tmp_path: 
                 assert view.pixel[0, 0] == pytest.approx(shown[0].clip(0), abs=4)
 
 
-def test_refusals(room: Path, stdout: Command, refusal: Command, tmp_path: Path) -> None:
-    text = room.read_text()
-    (room.parent / "boxes.csv").write_text("frame,left,top,width,height\n0,1,1,5,9\n")
+@cases()
+def test_sources_are_refused(room: Path, refusal: Command, tmp_path: Path, old: str, new: str, match: str) -> None:
     source = 'source = { kind = "video", path = "corner1.avi", detector = "model.onnx" }'
-    for change, match in (
-        (
-            'source = { kind = "masks", path = "corner1.avi", detector = "model.onnx" }',
-            "detector: found an unknown key",
-        ),
-        (source.replace("model.onnx", "none.onnx"), "camera corner1, detector: found No such file"),
-        (
-            source.replace("corner1.avi", "rtsp://host/1"),
-            r"camera\[1\] \(corner1\).source.detector: found a detector of a live",
-        ),
-        (source.replace(" }", ", starts = [0.0] }"), "files that follow one another"),
-        (source.replace('"model.onnx"', '"hog", classes = ["dog"]'), "hog: classes: found dog, expected person"),
-    ):
-        room.write_text(text.replace(source, change))
-        assert change in room.read_text()
-        assert re.search(match, refusal("detect", room, "-o", tmp_path / "boxes"))
+    assert old in source and source in room.read_text()
+    room.write_text(room.read_text().replace(source, source.replace(old, new)))
+    assert re.search(match, refusal("detect", room, "-o", tmp_path / "boxes"))
     assert not (tmp_path / "boxes").exists()
-    room.write_text(text)
+
+
+def test_boxes_alone_are_refused_and_a_detector_is_needed(
+    room: Path, stdout: Command, refusal: Command, tmp_path: Path
+) -> None:
+    (room.parent / "boxes.csv").write_text("frame,left,top,width,height\n0,1,1,5,9\n")
     stdout("inspect", room)
     assert re.search("corner0, detector: found a video without its boxes.*stseg detect", refusal("plan", room))
     boxes_alone = replace(read_recording(room), sources=(CameraSource(Source("boxes", room.parent / "boxes.csv")),) * 4)

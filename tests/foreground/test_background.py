@@ -300,34 +300,26 @@ def test_the_codebooks_log_odds_are_their_formula(seed: int, words: int) -> None
     np.testing.assert_allclose(log_odds, expected, atol=5e-3)
 
 
+@pytest.mark.parametrize("empty", [True, False])
 @drawn(30, seed=st.integers(0, 10**6), words=st.integers(1, 3))
-def test_codewords_of_the_empty_scene_are_learned_by_their_rules(seed: int, words: int) -> None:
+def test_codewords_learn_and_follow_by_their_rules(empty: bool, seed: int, words: int) -> None:
     rng = np.random.default_rng(seed)
     state = random_book(rng, words)
-    longest = rng.integers(0, 20, state[2].shape).astype(np.int32)
-    image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
-    found, runs = deepcopy(state), longest.copy()
-    codebook_kernels.teach(image, gain, NOW, np.float32(15), runs, found)
-    for v, u in np.ndindex(image.shape[:2]):
-        book = book_of(state, longest, v, u)
-        reference.teach(book, image[v, u].astype(float), gain.astype(float), NOW, 15)
-        assert_same_book(book_of(found, runs, v, u), book)
-
-
-@drawn(30, seed=st.integers(0, 10**6), words=st.integers(1, 3))
-def test_codewords_follow_the_scene_by_their_rules(seed: int, words: int) -> None:
-    rng = np.random.default_rng(seed)
-    state = random_book(rng, words)
-    none = np.zeros(state[2].shape, np.int32)
+    longest = rng.integers(0, 20 if empty else 1, state[2].shape).astype(np.int32)
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
     likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
-    found = deepcopy(state)
-    codebook_kernels.follow(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), (30, 12), found)
+    found, runs = deepcopy(state), longest.copy()
+    if empty:
+        codebook_kernels.teach(image, gain, NOW, np.float32(15), runs, found)
+    else:
+        codebook_kernels.follow(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), (30, 12), found)
     for v, u in np.ndindex(image.shape[:2]):
-        book = book_of(state, none, v, u)
-        x, chance = image[v, u].astype(float), float(likelihood[v, u])
-        reference.follow(book, x, gain.astype(float), chance, NOW, 15, 0.06, (30, 12))
-        assert_same_book(book_of(found, none, v, u), book)
+        book, x, light = book_of(state, longest, v, u), image[v, u].astype(float), gain.astype(float)
+        if empty:
+            reference.teach(book, x, light, NOW, 15)
+        else:
+            reference.follow(book, x, light, float(likelihood[v, u]), NOW, 15, 0.06, (30, 12))
+        assert_same_book(book_of(found, runs, v, u), book)
 
 
 def test_a_negative_run_goes_on_from_the_end_to_the_beginning() -> None:

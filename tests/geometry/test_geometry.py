@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from checks import compiled_only, drawn, numbers
+from checks import cases, compiled_only, drawn, numbers, refused
 from hypothesis import assume, example
 from hypothesis import strategies as st
 from recordings import track
@@ -124,18 +124,8 @@ class TestCamera:
         corners = np.array([[-0.5, -0.5], [643.4, 485.4], [643.5, 0.0], [0.0, 485.5], [-0.6, 0.0]])
         assert camera.inside(corners).tolist() == [True, True, False, False, False]
 
-    @pytest.mark.parametrize(
-        ("ground", "vertical", "key"),
-        [
-            (np.zeros((3, 3)), [0, 0, 1], "ground"),
-            (np.ones((3, 3)), [0, 0, 1], "ground"),
-            ([[1, 2, 3], [2, 4, 6], [0, 0, 1]], [0, 0, 1], "ground"),
-            (np.eye(3), [0, 0, 0], "vertical"),
-            (np.eye(3), [1, 2, 0], "vertical"),
-            (np.diag([1, 1, np.nan]), [0, 0, 1], "ground, vertical"),
-        ],
-    )
-    def test_refuses_what_is_no_view(self, ground: Floats, vertical: Floats, key: str) -> None:
+    @cases()
+    def test_refuses_what_is_no_view(self, ground: list[list[float]], vertical: list[float], key: str) -> None:
         with pytest.raises(CalibrationError, match="camera cam") as caught:
             Camera("cam", (640, 480), np.array(ground, float), np.array(vertical, float))
         assert caught.value.key == key
@@ -227,8 +217,8 @@ class TestRig:
 
     def test_cameras_that_look_away_are_named_but_at_upper_planes(self) -> None:
         away = Grid((50.0, 51.0), (0.0, 1.0), cell=0.5)
-        with pytest.raises(CalibrationError, match=r"camera down: ground: found a view that sees nothing"):
-            Rig("hall", 5.0, away, (straight_down(),)).require_coverage()
+        said = r"camera down: ground: found a view that sees nothing"
+        refused(CalibrationError, said, Rig("hall", 5.0, away, (straight_down(),)).require_coverage)
         camera = Camera.from_projection("cam", (640, 480), LEVEL)
         near = Grid((-0.5, 0.5), (1.0, 2.0), cell=0.5, top=1.8, planes=4)
         pixel, seen = camera.project(near.ground, 0.0)

@@ -201,8 +201,8 @@ def test_nobody_of_whom_nothing_is_known_is_recognised() -> None:
 
 def test_a_run_file_tells_of_its_people_or_says_why_not(tmp_path: Path) -> None:
     path = write_small_run(tmp_path / "run.h5")
-    with pytest.raises(ConfigError, match=r"--known: found that alone, expected tracking.return_probability below 1"):
-        read_known(path, CONFIG)
+    said = r"--known: found that alone, expected tracking.return_probability below 1"
+    refused(ConfigError, said, read_known, path, CONFIG)
     refused(FormatError, r"run.h5: /committed: found no rows", read_known, path, returning(0.99))
     before = np.zeros(2, KNOWN_PERSON)
     before["id"] = 2, 7

@@ -2,13 +2,14 @@
 
 from dataclasses import astuple
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import h5py
 import numpy as np
 import pytest
 from browser import CHROMIUM, chromium
-from checks import in_ci, refused
+from checks import cases, in_ci, refused
 from run_files import table_of, write_small_run
 
 from stseg import InputError, read_run
@@ -160,22 +161,13 @@ def test_swap_join_split_delete_and_name() -> None:
 def test_a_swap_at_an_end_hands_over_and_it_is_joined_once() -> None:
     solved = solve_corrections(tracks((0, 99), (60, 99)), [Answer("a", "swap", 1, 2, 60)])
     assert of(solved, 1, 59, 60) == [1, 2] and of(solved, 2, 60) == [1]
-    with pytest.raises(InputError, match="joined already"):
-        solve_corrections(tracks((0, 9), (20, 29), (20, 29)), [Answer("a", "join", 1, 2), Answer("b", "join", 1, 3)])
+    twice = [Answer("a", "join", 1, 2), Answer("b", "join", 1, 3)]
+    refused(InputError, "joined already", solve_corrections, tracks((0, 9), (20, 29), (20, 29)), twice)
 
 
-@pytest.mark.parametrize(
-    ("answer", "message"),
-    [
-        (Answer("f: line 2", "swap", 1, 9, 5), "f: line 2: id: found 9, expected a track"),
-        (Answer("f", "swap", 1, 2), "frame: found nothing"),
-        (Answer("f", "split", 1, frame=200), "frame: found 200"),
-        (Answer("f", "join", 1, 2), "tracks 1 and 2, both there in frame 0"),
-        (Answer("f", "swap", 1, 1, 5), "another track"),
-    ],
-)
-def test_answers_that_cannot_be_are_named(answer: Answer, message: str) -> None:
-    refused(InputError, message, solve_corrections, TWO, [answer])
+@cases()
+def test_answers_that_cannot_be_are_named(answer: Any, message: str) -> None:
+    refused(InputError, message, solve_corrections, TWO, [Answer(*answer)])
 
 
 def test_the_command_leaves_the_run_and_names_go_through(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -165,23 +166,14 @@ class TestProjection:
 class TestRealCalibrations:
     """The projections of the raw numbers, by OpenCV, to a hundredth of a pixel or better."""
 
-    @pytest.mark.parametrize(
-        ("name", "patterns", "cameras", "world", "size", "x", "y", "heights", "least"),
-        [
-            ("uu1", ["*/config.xml"], 4, World("mm", "-z"), (644, 486), (-1.5, 1.5, 7), (-2.5, 0.5, 7), (1.2, 2.5), 20),
-            ("uu4", ["*/config.xml"], 4, World("mm", "-z"), (644, 486), (-1.5, 1.5, 7), (-2.5, 0.5, 7), (1.2, 2.5), 20),
-            ("wildtrack/calibrations", ["intrinsic_zero/*.xml", "extrinsic/*.xml"], 7, World("cm"), (1920, 1080),
-             (-2.5, 8.5, 8), (-8.5, 26.5, 9), (1.5, 4.0), 10),
-            ("cmc", ["cam*_cam_mat.mat"], 4, World("m"), (1920, 1024), (2.0, 6.0, 5), (0.0, 3.4, 5), (1.8, 2.6), 10),
-        ],
-    )  # fmt: skip
+    @cases()
     def test_cameras_project_as_their_numbers_do(
-        self, name: str, patterns: list[str], cameras: int, world: World, size: tuple[int, int],
-        x: tuple[float, float, int], y: tuple[float, float, int], heights: tuple[float, float], least: int,
-    ) -> None:  # fmt: skip
+        self, name: str, patterns: list[str], cameras: int, axes: Any, size: Any, area: Any, heights: Any, least: int
+    ) -> None:
+        world = World(*axes)
         files_of_cameras = list(zip(*(sorted(data_path(name).glob(pattern)) for pattern in patterns), strict=True))
         assert len(files_of_cameras) == cameras
-        grid = np.stack(np.meshgrid(np.linspace(*x), np.linspace(*y)), -1).reshape(-1, 2)
+        grid = np.stack(np.meshgrid(*(np.linspace(*side) for side in area)), -1).reshape(-1, 2)
         for files in files_of_cameras:
             camera = camera_of((read_projection if name == "cmc" else read_opencv_xml)(list(files)), world, size)
             assert (camera.lens is None) == (world.unit != "mm")

@@ -6,7 +6,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from checks import drawn
+from checks import cases, drawn
 from hypothesis import strategies as st
 from scenes import room
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
@@ -46,17 +46,9 @@ def walk(evidence: Floats, track: int = 1, off: float = 0.0) -> list[tuple[int, 
     return [(t, x, y + off, e, track * (e > 5)) for t, ((x, y), e) in enumerate(zip(WALK, evidence, strict=True))]
 
 
-@pytest.mark.parametrize(
-    ("evidence", "other", "gone"),
-    [
-        pytest.param((12.0, 12.0, 1.0, 0.5, 0.2, 0.5, 1.0, 12.0, 12.0), (), 0, id="seen badly for five frames"),
-        pytest.param((12.0,) * 3 + (-15.0,) * 6, (), 6, id="strong evidence against a person"),
-        pytest.param((12.0,) * 9, ((4, 1.2, 1.2, 7.0, 2),), 1, id="a ghost that never continues"),
-        pytest.param((12.0,) * 9, ((4, -1.95, -1.95, 7.0, 2),), 0, id="one frame at the border"),
-    ],
-)
+@cases()
 def test_who_stays_and_who_goes(
-    evidence: tuple[float, ...], other: tuple[tuple[int, float, float, float, int], ...], gone: int
+    evidence: list[float], other: list[tuple[int, float, float, float, int]], gone: int
 ) -> None:
     found = candidates(*walk(np.array(evidence)), *other)
     real = decide(found).real

@@ -50,8 +50,7 @@ def viewers(spec: SceneSpec) -> list[Viewer]:
 
 @cases()
 def test_scene_refuses_what_cannot_be(key: str, value: object) -> None:
-    with pytest.raises(ConfigError, match=f"scene tiny: {key}"):
-        replace(TINY, **{key: value})  # type: ignore[arg-type]
+    refused(ConfigError, f"scene tiny: {key}", replace, TINY, **{key: value})
 
 
 @pytest.mark.parametrize("name", NAMED)
@@ -307,8 +306,7 @@ def test_lamps_and_clouds_light_what_is_near_and_people() -> None:
 
 @pytest.mark.parametrize(("key", "value"), [("brightness", -1.0), ("off", -2.0), ("rise", -1.0), ("reach", 0.0)])
 def test_lamps_that_cannot_be_are_refused(key: str, value: float) -> None:
-    with pytest.raises(ConfigError, match=key):
-        Lamp(**{"brightness": 1.0, "on": 0.0, key: value})  # type: ignore[arg-type]
+    refused(ConfigError, key, Lamp, **{"brightness": 1.0, "on": 0.0, key: value})  # type: ignore[arg-type]
 
 
 CAMERA = build_rig(replace(TINY, size=(320, 240))).cameras[0]
@@ -379,8 +377,7 @@ def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
     refused(OutputError, "no UTF-8", write_scene, tmp_path / os.fsdecode(b"\xff"), film)
     (tmp_path / "stseg-scene").unlink()
     refused(OutputError, r"truth\.csv: found a file that stseg did not", write_scene, tmp_path, film, overwrite=True)
-    with pytest.raises(OutputError):
-        write_scene(tmp_path / "notes.txt" / "below", film)
+    refused(OutputError, "", write_scene, tmp_path / "notes.txt" / "below", film)
 
 
 def test_command_changes_the_named_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

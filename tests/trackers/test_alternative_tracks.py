@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from checks import cases
 from coloured_people import RIG, rows_of
 from scenes import CONFIG, corner_cameras, detector_of, evidence_of, found, people, rig_of
 
@@ -40,20 +41,9 @@ def decided(rate: float, gains: Sequence[float | None]) -> tuple[int, AcceptedAl
     return -1, None
 
 
-@pytest.mark.parametrize(
-    ("rate", "gains", "last", "is_accepted"),
-    [
-        (5, [6.0, 6.0, 6.0], 3, True),
-        (10, [6.0] * 10, 6, True),  # frames within 0.2 s are not observations of their own
-        (2, [8.0, 8.0], 2, True),
-        (5, [4.0, -6.0, -9.0], 3, False),
-        (5, [4.0, None, None], 3, False),  # both say the same for 0.4 s
-        (5, [4.0, None, 4.0, None, 4.0, None, 4.0], 7, True),
-        (5, [0.5] * 30, 17, False),  # undecided for three seconds
-    ],
-)
-def test_evidence_of_some_time_decides(rate: float, gains: list[float | None], last: int, is_accepted: bool) -> None:
-    frame, decision = decided(rate, gains)
+@cases()
+def test_evidence_of_some_time_decides(rate: float, gains: list[float], last: int, is_accepted: bool) -> None:
+    frame, decision = decided(rate, [None if np.isnan(gain) else gain for gain in gains])
     assert (frame, decision is not None) == (last, is_accepted)
     if decision is not None:
         assert list(decision.readings) == list(range(1, last))
