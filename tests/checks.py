@@ -17,6 +17,8 @@ P = ParamSpec("P")
 Test = TypeVar("Test", bound=Callable[..., None])
 Command = Callable[..., str]
 """Calls a command with arguments of any kind; its answer."""
+Captured = pytest.CaptureFixture[str]
+"""What a test has printed."""
 REFUSAL_TIME = 10.0
 """Time within which any input is answered, seconds."""
 compiled_only = pytest.mark.skipif(not COMPILED, reason="too slow without a compiler")

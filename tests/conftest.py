@@ -7,7 +7,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in commands: its threads wait for work by spinning
 
 import pytest
-from checks import REFUSAL_TIME, Command, examples
+from checks import REFUSAL_TIME, Captured, Command, examples
 from hypothesis import HealthCheck, settings
 from recordings import track, write_recording
 from run_files import write_small_run
@@ -52,7 +52,7 @@ def run_path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def stdout(capsys: pytest.CaptureFixture[str]) -> Command:
+def stdout(capsys: Captured) -> Command:
     """A command that ends with the status 0; its standard output."""
 
     def call(*arguments: object) -> str:
@@ -66,7 +66,7 @@ def stdout(capsys: pytest.CaptureFixture[str]) -> Command:
 
 
 @pytest.fixture
-def refusal(capsys: pytest.CaptureFixture[str]) -> Command:
+def refusal(capsys: Captured) -> Command:
     """A command that refuses its input in time; its one line."""
 
     def call(*arguments: object) -> str:

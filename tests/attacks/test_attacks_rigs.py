@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 from attacks import film, write_rig
-from checks import Command, cases, refused
+from checks import Captured, Command, cases, refused
 from fuzz.corpus import mat_file
 
 from stseg import Config, read_recording
@@ -133,7 +133,7 @@ def test_ffmpeg_has_options_while_it_opens(given: str | None, tmp_path: Path, mo
 
 
 def test_damaged_pictures_are_answered_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Captured
 ) -> None:
     """libjpeg and libpng write to standard error by themselves."""
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from checks import Command, tables
+from checks import Captured, Command, tables
 from run_files import small_recording, write_small_run
 
 from stseg.commands.main import main
@@ -131,9 +131,7 @@ def test_an_export_that_lost_rows_is_not_published(
 
 
 @pytest.mark.parametrize("words", ["evaluate tracks.csv tracks.csv", "inspect run.h5", "report run.h5 -o page.html"])
-def test_work_shows_on_a_terminal(
-    folder: Path, words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_work_shows_on_a_terminal(folder: Path, words: str, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "tracks.csv").write_text("frame,id,x,y\n11,1,0.2,0.2\n")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setattr(standard_error, "_PATIENCE", 0.0)

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from checks import refused
+from checks import Captured, refused
 from simulated_people import ring
 
 from stseg import Recording, Rig, Source, align_rig, read_recording, write_rig
@@ -49,7 +49,7 @@ def moved_places(rig: Rig, aligned: Rig) -> None:
 
 @pytest.mark.parametrize("metres_per_pixel", [None, 0.02])
 def test_a_rig_comes_onto_known_points_and_onto_a_floor_plan(
-    room: Path, metres_per_pixel: float | None, capsys: pytest.CaptureFixture[str]
+    room: Path, metres_per_pixel: float | None, capsys: Captured
 ) -> None:
     unit = (1.0, 1.0) if metres_per_pixel is None else (50.0, -50.0)
     placed = room.parent / "placed.toml"

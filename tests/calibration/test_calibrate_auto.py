@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from checks import cases, drawn, in_ci, refused
+from checks import Captured, cases, drawn, in_ci, refused
 from films import write_at_rate
 from hypothesis import strategies as st
 from simulated_people import Walking, changed, delayed, walking
@@ -253,7 +253,7 @@ def film(path: Path, endpoints: Endpoints, frames: int) -> None:
 
 
 @pytest.mark.slow
-def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: Captured) -> None:
     scene = walking(2, 2, 20.0)
     videos = [tmp_path / "a.avi", tmp_path / "b.avi"]
     for video, endpoints in zip(videos, scene.views.endpoints, strict=True):

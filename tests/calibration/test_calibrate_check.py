@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from browser import CHROMIUM, Page, chromium
-from checks import data_path, in_ci, refused
+from checks import Captured, data_path, in_ci, refused
 from simulated_people import SIZE, exchanged, moved, ring, shown, walkers
 
 from stseg import Boxes, Camera, Recording, Rig, Source, read_recording, write_rig
@@ -166,7 +166,7 @@ class TestCommand:
         write_rig("room.toml", Recording(Path("room.toml"), moved(RIG, 2, "u", 30.0), tuple(sources)))
         return Path("room.toml")
 
-    def test_verdict_page_pictures_and_json(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_verdict_page_pictures_and_json(self, rig_file: Path, capsys: Captured) -> None:
         run("check", str(rig_file), "-o=check.html", "--pictures=shots")
         printed = capsys.readouterr().out
         assert "cam3 is off: of " in printed and "it shows camera frames" in printed

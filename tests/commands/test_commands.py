@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attacks import RIG, film, write_rig
-from checks import Command, cases, refused
+from checks import Captured, Command, cases, refused
 from recordings import COMMAND, ENVIRONMENT, process
 from run_files import small_recording, small_trajectory, trajectory_of, write_empty_run, write_run, write_small_run
 
@@ -53,7 +53,7 @@ def test_slips_on_the_command_line_are_one_line(arguments: list[str], told: str,
     assert told in refusal(*arguments)
 
 
-def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
     def interrupted(_: Path) -> None:
         raise KeyboardInterrupt
 

@@ -1,6 +1,5 @@
 """Named scenes in which views contradict each other: ghosts, and unexplained pixels."""
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -99,17 +98,9 @@ def crossings(standing: Floats, rig: Rig) -> Floats:
     return np.array(found)
 
 
-@dataclass(frozen=True)
-class Run:
-    """A scene after the whole way."""
-
-    steps: list[CommittedFrames]
-    tracks: Tracks
-
-
 @cache
-def moving_ghosts(kind: str) -> Run:
-    """The strollers, from frame 0 on, by the whole pipeline."""
+def moving_ghosts(kind: str) -> tuple[list[CommittedFrames], Tracks]:
+    """Committed frames and tracks of the strollers, from frame 0 on, by the whole pipeline."""
     rig = facing_pair()
     pipeline = Pipeline(rig, [kind] * 2, CONFIG, "cut")
     show = mask if kind == "pixels" else boxes
@@ -117,14 +108,13 @@ def moving_ghosts(kind: str) -> Run:
     steps = list(run_session(pipeline, [ViewForeground()] * 2, frames, 0, lambda _: None))
     rows, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
     committed = CommittedRows(rows, events, np.concatenate([s.appearance for s in steps]))
-    return Run(steps, pipeline.finished(committed)[0])
+    return steps, pipeline.finished(committed)[0]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_ghost_that_moves_with_its_makers(kind: str) -> None:
     """However long it is borne out, it never becomes a track."""
-    run = moving_ghosts(kind)
-    rows = run.tracks.trajectory
+    rows = moving_ghosts(kind)[1].trajectory
     assert np.unique(rows["id"]).tolist() == [1, 2] and len(rows) == 2 * FRAMES
     for row in rows:
         away = np.hypot(*(strollers(row["frame"])[:, :2] - [row["x"], row["y"]]).T)
@@ -151,7 +141,7 @@ def test_the_moving_ghost_is_borne_out_and_not_picked_up() -> None:
     assert worth > 0.8 * FRAMES
     # Its cells hold the unexplained evidence, which is none: they stay free.
     rig, radius = facing_pair(), 0.35
-    for step in moving_ghosts("pixels").steps:
+    for step in moving_ghosts("pixels")[0]:
         for scene, label in zip(step.commit.frames, step.commit.label, strict=True):
             standing = strollers(scene.frame)
             for ghost in crossings(standing, rig):

@@ -221,9 +221,7 @@ def test_sources_are_refused(room: Path, refusal: Command, tmp_path: Path, old: 
     assert not (tmp_path / "boxes").exists()
 
 
-def test_boxes_alone_are_refused_and_a_detector_is_needed(
-    room: Path, stdout: Command, refusal: Command, tmp_path: Path
-) -> None:
+def test_boxes_alone_are_refused(room: Path, stdout: Command, refusal: Command, tmp_path: Path) -> None:
     (room.parent / "boxes.csv").write_text("frame,left,top,width,height\n0,1,1,5,9\n")
     stdout("inspect", room)
     assert re.search("corner0, detector: found a video without its boxes.*stseg detect", refusal("plan", room))

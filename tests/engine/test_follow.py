@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import recordings
 from arrivals import FRAMES, StandIn, arrive, films, meanwhile, write_pieces
-from checks import Command, compiled_only, in_ci, refused
+from checks import Captured, Command, compiled_only, in_ci, refused
 from films import write_at_rate
 from recordings import COMMAND, PLACES, assert_same, filmed_rig, run_words, started
 from run_files import table_of, trajectory_of
@@ -203,7 +203,7 @@ def test_a_kill_at_the_end_is_mended(rig: Path, live: Path, tmp_path: Path, monk
 
 
 @pytest.mark.slow
-def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: Captured) -> None:
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)
     assert track(rig, output, "--follow", "--frames", f":{FRAMES}", "--set", "live.background_time=5") == 0
@@ -229,7 +229,7 @@ def _as_live(rig: Path, path: Path, addresses: dict[str, str]) -> Path:
 
 
 def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
-    cameras_rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    cameras_rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     begun = time.monotonic()
     own = {f"camera {camera.name}": StandIn(film * 9, 0.125, begun=begun)

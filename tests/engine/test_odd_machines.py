@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import pytest
 from attacks import write_rig
-from checks import Command, compiled_only, in_ci
+from checks import Captured, Command, compiled_only, in_ci
 from recordings import COMMAND, OPTIONS, assert_same, process, track, write_recording
 from run_files import write_small_run
 
@@ -42,7 +42,7 @@ for arguments in json.loads(sys.argv[1]):
 
 
 @LINUX
-def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: Captured) -> None:
     folder = tmp_path / os.fsdecode(b"caf\xe9:1")
     folder.mkdir()
     rig, run = write_recording(folder), str(folder / "run.h5")

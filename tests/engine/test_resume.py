@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from checks import Command, cases, compiled_only, drawn, in_ci
+from checks import Captured, Command, cases, compiled_only, drawn, in_ci
 from hypothesis import example
 from hypothesis.strategies import integers, sampled_from
 from recordings import COMMAND, FRAMES, PLACES, assert_same, process, run_words, started, track
@@ -128,7 +128,7 @@ def halfway(killed: Path, night: Path) -> Path:
 
 
 def test_a_flipped_byte_is_noticed_and_its_segment_made_anew(
-    rig_path: Path, undisturbed: Path, halfway: Path, capsys: pytest.CaptureFixture[str]
+    rig_path: Path, undisturbed: Path, halfway: Path, capsys: Captured
 ) -> None:
     first, second, *_ = segments_of(halfway)
     content = bytearray(second.read_bytes())
@@ -288,9 +288,7 @@ def test_two_runs_keep_off_one_output(rig_path: Path, night: Path, refusal: Comm
 
 
 @pytest.mark.slow
-def test_a_full_disk_loses_no_segment(
-    rig_path: Path, undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_full_disk_loses_no_segment(rig_path: Path, undisturbed: Path, tmp_path: Path, capsys: Captured) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
     if not _mount(disk, "280k"):

@@ -15,7 +15,7 @@ from typing import Any
 
 import distributed
 import pytest
-from checks import Command, cases, compiled_only, refused
+from checks import Captured, Command, cases, compiled_only, refused
 from cluster import Cluster, started_cluster
 from recordings import ENVIRONMENT, FRAMES, assert_same, process, run_words, track, write_recording
 from scenes import corner_cameras, rig_of
@@ -81,12 +81,7 @@ def test_what_a_worker_finds_wrong_is_one_line(tmp_path: Path, refusal: Command)
 
 @cases()
 def test_workers_that_never_begin_are_not_waited_for(
-    script: str,
-    found: str,
-    rig_path: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    script: str, found: str, rig_path: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each first runs the script that is the main module; imports before may take a busy machine 20 s."""
     (tmp_path / "script.py").write_text(script)
@@ -178,9 +173,8 @@ def test_a_ground_beyond_the_memory_is_refused(
         lambda: stseg.track(large, tmp_path / "run.h5"),
     ]
     for called in calls:
-        with pytest.raises(ConfigError) as error:
-            called()
-        assert key in str(error.value) and remedy in str(error.value) and "8.0 GiB that are free" in str(error.value)
+        said = refused(ConfigError, "8.0 GiB that are free", called)
+        assert key in said and remedy in said
 
 
 def test_nothing_is_imported_for_a_command_that_has_ended() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import cases, data_path
+from checks import Captured, cases, data_path
 from scenes import walkers
 
 from stseg.arrays import Rows
@@ -60,7 +60,7 @@ def test_tracks_that_match_or_are_bad_get_no_advice(tracks: Rows) -> None:
     assert "turned" not in str(reading_advice(room[room["frame"] < 100], tracks, GATE)), "any crowds fit in part"
 
 
-def test_the_command_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_says_it(tmp_path: Path, capsys: Captured) -> None:
     tracks = walkers(40)
     for name, rows in (("tracks.csv", tracks), ("truth.csv", moved(tracks, 100))):
         write_tracks_csv(tmp_path / name, rows)

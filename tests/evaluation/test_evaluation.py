@@ -13,7 +13,7 @@ from typing import Any, Literal, cast
 import numpy as np
 import pytest
 import reference_evaluation as reference
-from checks import data_path, drawn, refused
+from checks import Captured, data_path, drawn, refused
 from cyclopts import App
 from hypothesis import strategies as st
 from run_files import table_of
@@ -188,7 +188,7 @@ def test_neither_names_nor_the_order_of_rows_matter(seed: int) -> None:
 
 
 @pytest.mark.parametrize("case", GOLDEN)
-def test_a_reference_scorer_agrees_by_figure(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_reference_scorer_agrees_by_figure(case: str, tmp_path: Path, capsys: Captured) -> None:
     golden = GOLDEN[case]
     for name in ("truth", "tracks"):
         (tmp_path / f"{name}.csv").write_text("\n".join(golden[name]) + "\n", encoding="utf-8")
@@ -280,9 +280,7 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "tracks.csv", tmp_path / "truth.csv"
 
 
-def test_the_command_is_understood_and_says_what_it_took(
-    files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_is_understood_and_says_what_it_took(files: tuple[Path, Path], capsys: Captured) -> None:
     command(*files, area="-1,-2,8,9")
     printed = capsys.readouterr().out
     assert "10 frames, gate 0.5 m, x -1 .. 8, y -2 .. 9 m" in printed
@@ -303,7 +301,7 @@ def test_options_that_make_no_sense_are_refused(files: tuple[Path, Path], option
 
 
 def test_a_run_file_is_read_as_a_run(
-    files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     runs = ModuleType("stseg.io.runfile.runs")
     runs.read_trajectory = lambda _: read_tracks_csv(files[1])  # type: ignore[attr-defined]

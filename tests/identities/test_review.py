@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from browser import CHROMIUM, chromium
-from checks import cases, in_ci, refused
+from checks import Captured, cases, in_ci, refused
 from run_files import table_of, write_small_run
 
 from stseg import InputError, read_run
@@ -79,7 +79,7 @@ def test_gaps_weak_tracks_and_those_at_one_time_are_asked() -> None:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
-def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys: Captured) -> None:
     run = write_small_run(tmp_path / "run.h5")
     review(run, output=tmp_path / "review.html")
     assert "1 questions" in capsys.readouterr().out

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import cases, data_path, refused
+from checks import Captured, cases, data_path, refused
 from reference_geometry import matrix_of, project_by_matrix, project_by_opencv
 from scenes import rotation_towards
 from scipy.io import savemat
@@ -215,9 +215,7 @@ class TestPom:
         path.write_text("\n".join(lines))
         return path
 
-    def test_two_planes_make_a_camera_and_mirrors_are_named(
-        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_two_planes_make_a_camera_and_mirrors_are_named(self, tmp_path: Path, capsys: Captured) -> None:
         (foreign,) = read_pom([self.files(tmp_path, 2)], SIZE, self.head / self.cell)
         camera = World(str(self.cell), mirrored=True).camera(foreign, "c", SIZE)
         pixel, ahead = camera.project(GROUND, HEIGHTS)
@@ -263,7 +261,7 @@ class TestGuesses:
         read = (Path("c"), "a", SIZE, MATRIX, np.asarray(rotation), pose(0)[1], np.zeros(5))
         refused(CalibrationError, r"rotation: found a mirror", camera_from_pose, *read)
 
-    def test_a_mirrored_world_takes_one_try(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_a_mirrored_world_takes_one_try(self, tmp_path: Path, capsys: Captured) -> None:
         """A ground whose y counts downwards; the area lies to one side of its x axis."""
         for k, camera in enumerate(turned("+z", 1.0)):
             np.savetxt(tmp_path / f"c{k}.txt", camera.projection @ np.diag([1.0, -1.0, 1.0, 1.0]))
@@ -293,7 +291,7 @@ class TestCommand:
         pose_toml(tmp_path / "c.toml", "cam_")
         refused(InputError, complaint, run, "caliscope", "c.toml", "-o=r.toml", option)
 
-    def test_a_size_alone_is_asked_for(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_a_size_alone_is_asked_for(self, tmp_path: Path, capsys: Captured) -> None:
         pose_toml(tmp_path / "c.toml", "cam_", size=False)
         refused(ConfigError, r"--size: found nothing, .*c.toml does not say it", run, "pose2sim", "c.toml", "-o=r.toml")
         pose_toml(tmp_path / "c.toml", "cam_")

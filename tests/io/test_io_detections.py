@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attacks import write_rig
-from checks import cases, data_path, drawn, frozen, refused, tables
+from checks import Captured, cases, data_path, drawn, frozen, refused, tables
 from hypothesis import strategies as st
 
 from stseg import Camera, InputError, Source, read_recording
@@ -261,7 +261,7 @@ def test_frames_are_counted_as_said_and_wrong_keys_named(tmp_path: Path) -> None
 
 
 def test_inspect_says_what_a_rig_delivers_and_draws_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     sample(tmp_path, "Ultralytics text")

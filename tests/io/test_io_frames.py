@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from checks import cases, data_path, drawn, refused
+from checks import Captured, cases, data_path, drawn, refused
 from films import write_at_rate
 from hypothesis import assume
 from hypothesis import strategies as st
@@ -219,7 +219,7 @@ def test_colour_frames_stand_beside_detections_to_their_end(tmp_path: Path) -> N
 
 @cases()
 def test_sources_that_cannot_be_read(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: SourceKind, name: str, reported: str
+    tmp_path: Path, capfd: Captured, kind: SourceKind, name: str, reported: str
 ) -> None:
     (tmp_path / "text.avi").write_text("no video, no boxes")
     (tmp_path / "empty.avi").touch()

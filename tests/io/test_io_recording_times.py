@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import compiled_only
+from checks import Captured, compiled_only
 from films import TICK, Film, regular, standing, write_at_rate, write_films
 from recordings import assert_same
 from scenes import FRAME_RATE
@@ -69,7 +69,7 @@ def test_files_of_a_piece_each_make_the_same_tracks(whole: Run, tmp_path: Path) 
     assert_same(parts.path, whole.path)
 
 
-def test_rates_and_lost_frames_are_put_right(whole: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rates_and_lost_frames_are_put_right(whole: Run, tmp_path: Path, capsys: Captured) -> None:
     """One camera in time, one at twice the rate, one that varies and drops frames; and for a while none sees."""
     lost = [44, 45]
     double = np.delete(np.arange(2 * FRAMES) * TICK / 2, np.s_[2 * 44 - 1 : 2 * 45 + 2])
@@ -116,7 +116,7 @@ def gaps_of(run: Run) -> list[tuple[int, str]]:
     return [(int(row["frame"]), row["reason"].decode()) for row in found if row["reason"].startswith(b"gap")]
 
 
-def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: Captured) -> None:
     """What no camera has for longer than anybody is waited for. Two tell it by stamps, one by its files' starts."""
     seconds = np.delete(regular(90), np.s_[28:64])
     started = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))

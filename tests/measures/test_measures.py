@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import cases, refused
+from checks import Captured, cases, refused
 from run_files import table_of, trajectory_of, write_small_run
 from scipy.signal import lfilter
 
@@ -115,7 +115,7 @@ def zone_file(tmp_path: Path) -> Path:
     return path
 
 
-def test_command_and_python_agree(tmp_path: Path, zone_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_and_python_agree(tmp_path: Path, zone_file: Path, capsys: Captured) -> None:
     run = write_small_run(tmp_path / "run.h5")
     line = tmp_path / "line.geojson"
     line.write_text(json.dumps(feature("LineString", [[0.2, 0], [0.2, 0.4]])))

@@ -8,6 +8,7 @@ import numpy as np
 import pandas
 import pedpy
 import pytest
+from checks import Captured
 from run_files import small_recording, table_of, write_run
 
 from stseg import Grid, Run, read_run
@@ -53,7 +54,7 @@ def test_lines_are_crossed_and_speed_is_of_a_steady_walk() -> None:
     assert found["frame"].tolist() == list(range(1, 8))
 
 
-def test_flow_speed_and_density_are_pedpy_s_and_printed(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_flow_speed_and_density_are_pedpy_s_and_printed(run: Run, capsys: Captured) -> None:
     table = run.data_frame("trajectory")
     found = flow_and_density.crossings(table, np.array([-3.0, 0.0]), np.array([3.0, 0.0]))
     line = pedpy.MeasurementLine([(-3, 0), (3, 0)])

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import run_files
 from browser import CHROMIUM, chromium
-from checks import Command, cases, refused
+from checks import Captured, Command, cases, refused
 from numpy.typing import ArrayLike
 from scenes import looking
 
@@ -138,7 +138,7 @@ def test_camera_pixels_are_shown_only_when_asked_for(filmed_run: Path, tmp_path:
     assert found == [[False, False], [True, True]]
 
 
-def test_pictures_stand_beside_the_page(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pictures_stand_beside_the_page(run_path: Path, tmp_path: Path, capsys: Captured) -> None:
     report(run_path, output=tmp_path / "a.html", pictures=tmp_path / "one", frame=(11,))
     maps = {"plan", "spacetime", "density", "dwell", "flow", "ghosts", "blind"}
     plain = maps | {"slices", "marginal", "overlay_left", "overlay_right"}

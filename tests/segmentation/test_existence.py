@@ -6,7 +6,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from checks import cases, drawn
+from checks import cases, drawn, frozen
 from hypothesis import strategies as st
 from scenes import room
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
@@ -47,10 +47,8 @@ def walk(evidence: Floats, track: int = 1, off: float = 0.0) -> list[tuple[int, 
 
 
 @cases()
-def test_who_stays_and_who_goes(
-    evidence: list[float], other: list[tuple[int, float, float, float, int]], gone: int
-) -> None:
-    found = candidates(*walk(np.array(evidence)), *other)
+def test_who_stays_and_who_goes(evidence: list[float], other: list[list[float]], gone: int) -> None:
+    found = candidates(*walk(np.array(evidence)), *frozen(other))
     real = decide(found).real
     assert real[(found.track < 2) & (found.evidence > 0)].all() and (~real).sum() == gone
 

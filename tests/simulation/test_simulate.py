@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from checks import cases, compiled_only, drawn, numbers, refused
+from checks import Captured, cases, compiled_only, drawn, numbers, refused
 from hypothesis import strategies as st
 from reference_simulate import extents, hits, shade
 from scipy.spatial.distance import pdist
@@ -377,10 +377,10 @@ def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
     refused(OutputError, "no UTF-8", write_scene, tmp_path / os.fsdecode(b"\xff"), film)
     (tmp_path / "stseg-scene").unlink()
     refused(OutputError, r"truth\.csv: found a file that stseg did not", write_scene, tmp_path, film, overwrite=True)
-    refused(OutputError, "", write_scene, tmp_path / "notes.txt" / "below", film)
+    refused(OutputError, "notes.txt", write_scene, tmp_path / "notes.txt" / "below", film)
 
 
-def test_command_changes_the_named_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_changes_the_named_scene(tmp_path: Path, capsys: Captured) -> None:
     simulate(tmp_path / "s", scene="tiny", cameras=1, seconds=0.2, size="40,32", noise=0.0, people=1)
     recording = read_recording(tmp_path / "s" / "rig.toml")
     assert [camera.size for camera in recording.rig.cameras] == [(40, 32)]
@@ -389,7 +389,7 @@ def test_command_changes_the_named_scene(tmp_path: Path, capsys: pytest.CaptureF
 
 
 @compiled_only
-def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: Captured) -> None:
     simulate(tmp_path / "s", scene="long", cameras=2, seconds=0.4, size="64,48")
     assert {path.name for path in (tmp_path / "s").iterdir()} == {
         "stseg-scene", "rig_boxes.toml", "truth.csv", "cam1_boxes.csv", "cam2_boxes.csv",

@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from checks import in_ci
+from checks import in_ci, refused
 
 from stseg import Boxes, Tracker, evaluate
 from stseg.arrays import Bytes
@@ -79,8 +79,7 @@ def test_the_command_names_kinds_and_strengths(tmp_path: Path) -> None:
     masks = [cv2.VideoCapture(str(tmp_path / name / "cam1_masks.avi")).read()[1] for name in "ab"]
     assert 0 < (masks[0] > 0).sum() < (masks[1] > 0).sum()
     for wrong in ("fog", "holes:x", "holes:2", ":1"):
-        with pytest.raises(ConfigError):
-            simulate(tmp_path / "c", scene="tiny", spoil=(wrong,))
+        refused(ConfigError, "spoil", simulate, tmp_path / "c", scene="tiny", spoil=(wrong,))
 
 
 @pytest.mark.parametrize("kind", ["holes", *in_ci("dilation", "rain")])

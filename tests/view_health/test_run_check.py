@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import compiled_only, data_path
+from checks import Captured, compiled_only, data_path
 from recordings import track, write_recording
 from scenes import detector_of, evidence_of, people, room
 from simulated_people import moved
@@ -81,7 +81,7 @@ def test_a_knock_is_found_with_its_window(side: int) -> None:
 
 @pytest.mark.slow
 @compiled_only
-def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: Captured) -> None:
     path = write_recording(tmp_path, 40)
     recording = read_recording(path)
     assert track(path, tmp_path / "sound.h5") == 0
