@@ -122,34 +122,19 @@ def _hidden_by(hiders: RaggedArray, views: int, candidates: int) -> RaggedArray:
 
 
 @part
-def join_boxes(i: int, state: BoxState) -> None:
-    """Put candidate i among the members of its boxes."""
-    listed = state.fitting_members
+def list_members(i: int, inside: Flags, state: BoxState) -> None:
+    """List the members of the boxes of candidate i anew, who has joined or left the set, inside (candidate,)."""
+    fits, fitting = state.fits, state.fitting
     for view in range(state.views):
         row = view * len(state.is_linked) + i
-        for k in range(state.fits.start[row], state.fits.start[row + 1]):
-            box = view * state.boxes + state.fits.item[k]
-            first, place = state.fitting.start[box], state.fitting.start[box] + state.members[box]
-            while place > first and listed[place - 1] > i:
-                listed[place] = listed[place - 1]
-                place -= 1
-            listed[place] = i
-            state.members[box] += 1
-
-
-@part
-def leave_boxes(i: int, state: BoxState) -> None:
-    """Take candidate i from the members of its boxes."""
-    listed = state.fitting_members
-    for view in range(state.views):
-        row = view * len(state.is_linked) + i
-        for k in range(state.fits.start[row], state.fits.start[row + 1]):
-            box = view * state.boxes + state.fits.item[k]
-            first = kept = state.fitting.start[box]
-            for place in range(first, first + state.members[box]):
-                listed[kept] = listed[place]
-                kept += listed[kept] != i
-            state.members[box] -= 1
+        for k in range(fits.start[row], fits.start[row + 1]):
+            box = view * state.boxes + fits.item[k]
+            first = place = fitting.start[box]
+            for m in range(first, fitting.start[box + 1]):
+                if inside[fitting.item[m]]:
+                    state.fitting_members[place] = fitting.item[m]
+                    place += 1
+            state.members[box] = place - first
 
 
 @part

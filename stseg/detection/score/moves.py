@@ -5,7 +5,7 @@ The work of a move is that of its neighbourhood.
 
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import DetectionProblem, RaggedArray
-from stseg.detection.score.box_state import join_boxes, leave_boxes, link
+from stseg.detection.score.box_state import link, list_members
 from stseg.detection.score.gains import fill_evidence, gain
 from stseg.detection.score.pixel_state import assign_pixels, reassign_pixels, release_pixels
 from stseg.detection.score.set_state import NO_MEMBER, Kept, SetState, set_state
@@ -38,7 +38,7 @@ def put(i: int, place: int, state: SetState) -> None:
     size[0] += 1
     assign_pixels(i, state.pixels)
     assign_track(i, state.tracks)
-    join_boxes(i, state.boxes)
+    list_members(i, state.inside, state.boxes)
 
 
 @kernel
@@ -50,7 +50,7 @@ def withdraw(place: int, state: SetState) -> int:
     for view in range(len(state.pixels.evidence.raster)):
         reassign_pixels(view, i, state.inside, state.pixels)
     release_track(i, state.inside, state.tracks)
-    leave_boxes(i, state.boxes)
+    list_members(i, state.inside, state.boxes)
     return i
 
 
