@@ -77,16 +77,10 @@ class _CameraTimes:
 
 
 def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> TimeAlignment:
-    """Align the frames of all cameras in time.
+    """Align the frames of all cameras by the time stamps of all frames of each of their files.
 
-    SourceError where a camera's `clock` is "stamps" and it has none, or `starts` do not fit its files.
-
-    Parameters
-    ----------
-    recording
-        The rig and its streams.
-    times : float64 (n,) each
-        Time stamps of all frames of each file of each camera, milliseconds; nan where there is none.
+    Stamps float64 (n,) are in milliseconds, nan where there is none. SourceError where a camera's `clock` is "stamps"
+    and it has none, or `starts` do not fit its files.
     """
     rate = recording.rig.frame_rate
     cameras = [

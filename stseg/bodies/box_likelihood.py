@@ -79,15 +79,7 @@ def _fill(pixel: Floats, score: Floats, step: float, likelihood: Singles) -> Non
 
 @kernel
 def body(across: float, down: float) -> float:
-    """Density of a body at a place of its box, 0..1.
-
-    Parameters
-    ----------
-    across
-        -1 at the box's left edge, 1 at its right.
-    down
-        0 at its top edge, 1 at its bottom.
-    """
+    """Density of a body at a place of its box, 0..1: across from -1 to 1, left to right, and down from 0 to 1."""
     half = 0.5 * (1.0 - _NECK)
     trunk = math.sqrt(math.sqrt(across**4 + ((down - _NECK - half) / half) ** 4))
     head = math.sqrt((across / _HEAD_WIDTH) ** 2 + (2.0 * down / _HEAD_DEPTH - 1.0) ** 2)

@@ -113,14 +113,7 @@ def finished_tracks(
 ) -> tuple[Tracks, Ints]:
     """The tracks of a whole run, and the track id of each committed row.
 
-    Parameters
-    ----------
-    rig, config, tracker
-        By which the rows were committed.
-    rows
-        Rows of all frames.
-    image_rig
-        The rig in whose pixels the tracks' boxes are given.
+    Rig, configuration and tracker are those that committed the rows; boxes are in the pixels of `image_rig`.
     """
     if not tracker.final:
         return associated_tracks(rig, config, rows, image_rig)

@@ -98,15 +98,7 @@ class Session:
             return [foreground.evidence(view) for foreground, view in views]
 
     def add(self, frame_set: FrameSet, evidence: list[ViewEvidence] | None = None) -> list[CommittedFrames]:
-        """The next frame set; the results that it decides.
-
-        Parameters
-        ----------
-        frame_set
-            The observations.
-        evidence
-            The result of `evidence` for them, if it was called before.
-        """
+        """The results that the next frame set decides, with its evidence where `evidence` was called for it before."""
         evidence = self.evidence(frame_set) if evidence is None else evidence
         sizes = [camera.size for camera in self.pipeline.rig.cameras]
         evidence = self._estimates.box_bias.corrected(evidence, sizes)

@@ -28,12 +28,7 @@ _LEAST_EXTENT = 1.0
 def reading_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
     """One sentence that names the reading of a truth that tracks would match; None where the given one does.
 
-    Parameters
-    ----------
-    truth, trajectory
-        As `stseg.evaluation.evaluate` takes them.
-    gate
-        Metres within which a row meets a track.
+    Truth and trajectory are as `stseg.evaluation.evaluate` takes them; a row meets a track within the gate, metres.
     """
     truth = sampled(truth)
     if not len(truth) or not len(trajectory):

@@ -29,7 +29,7 @@ _LEAST_FIT = 18.0
 """A box that fits a pillar by this much worse than perfectly is none, nats: it would raise L by less than a level."""
 
 
-class CellsByPerson(NamedTuple):
+class Vicinity(NamedTuple):
     """Ground cells by the person near them."""
 
     near_person: Ints
@@ -71,7 +71,7 @@ def fill_fit(
     person_prior: Floats,
     boxes: ViewBoxes,
     owner: Ints,
-    cells: CellsByPerson,
+    vicinity: Vicinity,
     fit: CellFit,
 ) -> None:
     """Fill the fit, which has no cell yet.
@@ -90,16 +90,16 @@ def fill_fit(
     for b in range(len(boxes.edges)):
         box, tolerance, person = boxes.edges[b], boxes.tolerance[b], owner[b]
         if person >= 0:
-            for k in range(cells.start[person], cells.start[person + 1]):
+            for k in range(vicinity.start[person], vicinity.start[person + 1]):
                 for h in range(len(height_prior)):
-                    body = pillars[h * ground_cells + cells.cell[k]]
+                    body = pillars[h * ground_cells + vicinity.cell[k]]
                     own_match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
-                    _add_fit(np.float32(person_prior[person, h] + own_match), h, cells.cell[k], fit)
+                    _add_fit(np.float32(person_prior[person, h] + own_match), h, vicinity.cell[k], fit)
             continue
         number = fill_fits(index, pillars, boxes, b, boxes.belief[b] - _LEAST_FIT, pillar, match)
         for k in range(number):
             h, cell = pillar[k] // ground_cells, pillar[k] % ground_cells
-            prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]
+            prior = height_prior[h] if vicinity.near_person[cell] < 0 else person_prior[vicinity.near_person[cell], h]
             _add_fit(np.float32(prior + match[k]), h, cell, fit)
 
 

@@ -16,7 +16,7 @@ from stseg.geometry import Rig
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN, Levels, SumTable
-from stseg.occupancy.box_planes import CellFit, CellsByPerson, fill_fit, fill_levels, level_of_match
+from stseg.occupancy.box_planes import CellFit, Vicinity, fill_fit, fill_levels, level_of_match
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
@@ -116,7 +116,7 @@ class Occupancy:
         self, evidence: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[ErrorRates], noise: BoxNoise
     ) -> _Fused:
         near_person = nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
-        vicinity = CellsByPerson.of(near_person, len(explanation.people))
+        vicinity = Vicinity.of(near_person, len(explanation.people))
         views = [
             None if view is None else self._prepared(i, view, explanation, vicinity, noise)
             for i, view in enumerate(evidence)
@@ -132,7 +132,7 @@ class Occupancy:
         return _Fused(cells, near_person, terms, Sums.of(terms, memory))
 
     def _prepared(
-        self, i: int, view: Boxes | Singles, explanation: Explanation, vicinity: CellsByPerson, noise: BoxNoise
+        self, i: int, view: Boxes | Singles, explanation: Explanation, vicinity: Vicinity, noise: BoxNoise
     ) -> _PreparedView:
         assignment, marked = self._assignment(i, explanation), self._tables.nothing_marked()
         mark_people(self._tables.reach[i], assignment, marked)
@@ -239,7 +239,7 @@ class Occupancy:
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 
-    def _fit(self, i: int, view: Boxes, explanation: Explanation, vicinity: CellsByPerson, noise: BoxNoise) -> CellFit:
+    def _fit(self, i: int, view: Boxes, explanation: Explanation, vicinity: Vicinity, noise: BoxNoise) -> CellFit:
         """Fit of the boxes of a view to bodies at the ground cells."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"

@@ -22,17 +22,7 @@ from stseg.trajectories.final_tracks import bridged_rows
 
 
 class LiveCorrections:
-    """Corrections of the ids of a live run, in the order of time.
-
-    Parameters
-    ----------
-    frame_rate
-        Frames per second.
-    border
-        Where people come and go.
-    config
-        The constants of all stages.
-    """
+    """Corrections of the ids of a live run, in the order of time."""
 
     def __init__(self, frame_rate: float, border: Border, config: Config) -> None:
         self._rate, self._border, self._config = frame_rate, border, config
@@ -40,18 +30,10 @@ class LiveCorrections:
         self._due = 0
 
     def decide(self, rows: Rows, appearance: Rows, new_id: Callable[[], int]) -> Rows:
-        """The corrections that the next rows bring.
+        """The CORRECTION rows (k,) that the next rows bring.
 
-        Parameters
-        ----------
-        rows : TRAJECTORY (n,), appearance : APPEARANCE (l,)
-            Committed rows under live ids, with what the detections look like.
-        new_id
-            A new live id.
-
-        Returns
-        -------
-        CORRECTION (k,)
+        TRAJECTORY rows (n,) are committed under live ids, APPEARANCE rows (l,) are what the detections look like;
+        `new_id` gives a new live id.
         """
         live = self._config.live
         if not len(rows) or live.correction_interval == 0:
@@ -91,15 +73,9 @@ def corrected_ids(rows: Rows, corrections: Rows) -> Rows:
 
 
 def renamed(names: dict[int, int], corrections: Rows, present: Container[int]) -> dict[int, int]:
-    """Ids of tracks that go on after the corrections of a decision; a lost track is left out where its id is taken.
+    """Ids of tracks that go on after the CORRECTION rows (k,) of a decision, from the names before.
 
-    Parameters
-    ----------
-    names
-        Id of each track.
-    corrections : CORRECTION (k,)
-    present
-        Tracks of the latest rows.
+    A lost track, which is none of those present in the latest rows, is left out where its id is taken.
     """
     now = {int(one["id"]): int(one["corrected_id"]) for one in corrections if one["last"] == one["decision_frame"]}
     found = {track: now.get(name, name) for track, name in names.items()}
@@ -132,14 +108,9 @@ Names = dict[int, int]
 
 
 class LiveIds:
-    """The names given so far.
+    """The names given so far, with the TRAJECTORY rows (n,) that have them, and what was corrected in these.
 
-    Parameters
-    ----------
-    rows : TRAJECTORY (n,), corrections : CORRECTION (k,)
-        Rows committed before, under names of the run, and what was corrected in them.
-    kept
-        Number of latest frames with rows for stitching.
+    Rows of the latest `kept` frames are kept for stitching.
     """
 
     def __init__(self, rows: Rows, corrections: Rows, kept: int) -> None:

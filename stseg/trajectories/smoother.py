@@ -78,16 +78,9 @@ def _between(before: np.void, after: np.void) -> Rows:
 
 
 def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> Rows:
-    """A copy with smoothed x, y and their covariance; raw_x and raw_y stay the detection's.
+    """A copy of TRAJECTORY rows (n,), sorted by frame, with smoothed x, y and their covariance.
 
-    Parameters
-    ----------
-    trajectory : TRAJECTORY (n,)
-        Sorted by frame.
-    frame_rate
-        Frames per second.
-    model
-        Motion model.
+    The columns raw_x and raw_y stay the detection's.
     """
     smoothed = trajectory.copy()
     if not len(trajectory):

@@ -17,13 +17,7 @@ _KNOCKED = "shows people beside their places, as after a push: excluded"
 
 
 class ExcludedViews:
-    """Events of views that are excluded although their camera delivers: where that begins and ends.
-
-    Parameters
-    ----------
-    cameras
-        Names of the cameras, in the rig's order.
-    """
+    """Events of views of named cameras that are excluded although they deliver: where that begins and ends."""
 
     def __init__(self, cameras: Sequence[str]) -> None:
         self._cameras = cameras
@@ -74,13 +68,6 @@ class FrozenViews:
 
     A view is frozen once it has been the same, bit by bit, for half a second in which most of the others changed.
     Where all stand still, or a view shows no person, sameness is no failure.
-
-    Parameters
-    ----------
-    views
-        Number of views.
-    frame_rate
-        Frames per second.
     """
 
     def __init__(self, views: int, frame_rate: float) -> None:
@@ -113,13 +100,7 @@ def _is_repeated(view: Observation, last: Observation) -> bool:
 
 
 class BlindViews:
-    """Record of a live recording's missing views and dropped frames until their frames are committed.
-
-    Parameters
-    ----------
-    cameras
-        Names of the cameras, in the rig's order.
-    """
+    """Missing views of named cameras in a live recording, and dropped frames, until their frames are committed."""
 
     def __init__(self, cameras: Sequence[str]) -> None:
         self._cameras = cameras

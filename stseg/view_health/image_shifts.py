@@ -44,15 +44,10 @@ def image_shifts(
 
 
 def background_shift(background: Bytes, image: Bytes) -> Floats:
-    """Shift (u, v) of an image's edges against the background, pixels, float64 (2,).
+    """Shift (u, v) of an image's edges against the background, both uint8 (v, u, 3), pixels, float64 (2,).
 
     Phase correlation of the edges (Kuglin and Hines, The phase correlation image alignment method, 1975), which people
     and changes of light disturb little.
-
-    Parameters
-    ----------
-    background, image : uint8 (v, u, 3)
-        Of one size.
     """
     # With SciPy's transforms: OpenCV's differ in the last digits from one call to the next.
     one, other = (rfft2(_edges(picture) * _window(*picture.shape[:2])) for picture in (background, image))

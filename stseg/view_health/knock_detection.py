@@ -119,14 +119,9 @@ class ViewResidual:
 
 
 def views_off(residuals: Floats, cell: float) -> list[ViewResidual]:
-    """Views with the largest residuals where these exceed a cell; largest first.
+    """Views with the largest residuals where these exceed the side of a cell, metres; largest first.
 
-    Parameters
-    ----------
-    residuals : float64 (window, view)
-        Metres; nan where a view has no measurement.
-    cell
-        Side of a cell, metres.
+    Residuals float64 (window, view) are in metres, nan where a view has no measurement.
     """
     median = np.array([_clear_median(view_residuals[np.isfinite(view_residuals)]) for view_residuals in residuals.T])
     order = np.argsort(-np.abs(median), kind="stable")

@@ -20,7 +20,7 @@ from stseg.config import OccupancyConfig
 from stseg.geometry import Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
 from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
-from stseg.occupancy.box_planes import CellFit, CellsByPerson, fill_fit, fill_levels, level_of_match, plane_likelihood
+from stseg.occupancy.box_planes import CellFit, Vicinity, fill_fit, fill_levels, level_of_match, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 from stseg.occupancy.shown_cells import CellTables, ShownCells
@@ -137,7 +137,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     tolerance = np.tile(TOLERANCE, (len(found), 1))
     view = ViewBoxes(edges, tolerance, np.log(shaken.score), 128.0, 96.0)
     fit = CellFit.unfilled(3, 16)
-    index, cells = PillarIndex.of(pillars, camera.size), CellsByPerson.of(near_person, 2)
+    index, cells = PillarIndex.of(pillars, camera.size), Vicinity.of(near_person, 2)
     fill_fit(index, pillars, prior[0], prior[1:], view, box_owner, cells, fit)
     rates, levels = ErrorRates(0.1, 0.2, 0.3), np.empty((4, 16), np.int16)
     levels[:] = level_of_match(0.0, rates.miss, rates.clutter)

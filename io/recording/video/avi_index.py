@@ -22,20 +22,10 @@ _WHOLE, _CUT, _LOST = range(3)
 
 
 def lost_frames(path: Path, decoded: int) -> Ints | None:
-    """Numbers of the frames that a video lost to damage, int64 (n,), rising.
+    """Numbers of the frames that a video lost to damage, int64 (n,), rising, by the number of those that were decoded.
 
-    Parameters
-    ----------
-    path
-        The video.
-    decoded
-        Number of frames that were decoded.
-
-    Returns
-    -------
-    int64 (n,), or None
-        Empty where nothing is lost, or the file is no AVI with an index. None where frames are lost that the index does
-        not place.
+    Empty where nothing is lost, or the file is no AVI with an index. None where frames are lost that the index does not
+    place.
     """
     try:
         with path.open("rb") as file:

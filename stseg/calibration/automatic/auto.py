@@ -56,12 +56,7 @@ def align_all(
 def merge_views(places: Sequence[ViewPlaces], pairs: Pairs) -> MergedViews:
     """Merge all views with the greatest total support.
 
-    Parameters
-    ----------
-    places
-        Places of the people of each view on a ground of its own.
-    pairs
-        Alignments of every two views, see `align_all`.
+    `places` are those of the people of each view on a ground of its own, `pairs` the alignments of `align_all`.
     """
     starts = [(one.support, i, j, one) for (i, j), several in pairs.items() for one in several[:2]]
     starts.sort(key=lambda start: -start[0])
@@ -152,16 +147,9 @@ def calibrate_from_people(names: Sequence[str], views: CalibrationInput, progres
 def sharpen_by_floor(
     views: CalibrationInput, solution: SolvedViews, backgrounds: Sequence[Bytes]
 ) -> tuple[SolvedViews, int]:
-    """Refine a solution by floor features; returns their number too, 0 on a bare floor.
+    """Refine a solution for views by floor features; returns their number too, 0 on a bare floor.
 
-    Parameters
-    ----------
-    views
-        Input of `solution`.
-    solution
-        Cameras calibrated from people.
-    backgrounds
-        The empty scene in each view, uint8 (v, u, 3).
+    `backgrounds` uint8 (v, u, 3) are the empty scene in each view.
     """
     names = [str(view) for view in range(len(backgrounds))]
     count = 0

@@ -76,17 +76,9 @@ def concatenate_endpoints(parts: list[tuple[int, Floats]]) -> Endpoints:
 
 
 def upright_endpoints(likelihood: Singles) -> Floats:
-    """Feet and heads of the isolated upright people of one view and frame.
+    """Foot and head (u, v) of the isolated upright people of one view and frame, pixels, float64 (n, 2, 2).
 
-    Parameters
-    ----------
-    likelihood : float32 (v, u)
-        Of foreground, 0..1.
-
-    Returns
-    -------
-    float64 (n, 2, 2)
-        Foot and head (u, v), pixels.
+    `likelihood` float32 (v, u) is that of foreground, 0..1.
     """
     _, label, stats, _ = cv2.connectedComponentsWithStats((likelihood > SILHOUETTE_LIKELIHOOD).astype(np.uint8))
     large = stats[:, 4] >= _SPECK

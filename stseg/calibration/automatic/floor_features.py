@@ -51,16 +51,9 @@ class Marks:
 
 
 def floor_marks(backgrounds: Sequence[Bytes], cameras: Sequence[Camera], grid: Grid) -> Marks:
-    """Match floor features between every two views.
+    """Match floor features on the ground between every two of some roughly calibrated views.
 
-    Parameters
-    ----------
-    backgrounds
-        The empty scene in each view, uint8 (v, u, 3).
-    cameras
-        Roughly calibrated views.
-    grid
-        The ground to search.
+    `backgrounds` uint8 (v, u, 3) are the empty scene in each view.
     """
     x, y = np.arange(grid.x[0], grid.x[1], _PLAN_RESOLUTION), np.arange(grid.y[0], grid.y[1], _PLAN_RESOLUTION)
     ground = np.stack(np.meshgrid(x, y), -1)  # of a plan, (y, x, 2)

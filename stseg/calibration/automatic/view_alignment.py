@@ -63,17 +63,7 @@ IDENTITY = Alignment(0, 1 + 0j, 0j, 0.0)
 
 
 def align(a: ViewPlaces, b: ViewPlaces, frame_rate: float, most_delay: int) -> list[Alignment]:
-    """The few best supported alignments of two views, the best first.
-
-    Parameters
-    ----------
-    a, b
-        The two views.
-    frame_rate
-        Frames per second.
-    most_delay
-        Largest delay, frames.
-    """
+    """The few best supported alignments of two views by at most so many frames of delay, the best first."""
     tried = _hypotheses(a, b, frame_rate, most_delay)
     judged = sorted((_refined(a, b, one) for one in tried), key=lambda one: -one.support)
     best: list[Alignment] = []

@@ -61,14 +61,7 @@ def tables_of(rig: Rig) -> list[BodyTable]:
 def match_boxes(rig: Rig, tables: Sequence[BodyTable], frame: int, boxes: Sequence[Floats]) -> BoxCorrespondences:
     """Match the boxes of one frame between views; people seen by at least two are kept.
 
-    Parameters
-    ----------
-    tables
-        See `tables_of`.
-    frame
-        Frame number.
-    boxes
-        For each view float64 (b, 4), left, top, right, bottom in pixels.
+    `tables` are those of `tables_of`; boxes float64 (b, 4) of each view are left, top, right, bottom in pixels.
     """
     ground, height = _candidates(rig, boxes)
     views = len(boxes)
@@ -87,20 +80,9 @@ def match_boxes(rig: Rig, tables: Sequence[BodyTable], frame: int, boxes: Sequen
 
 
 def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) -> Floats:
-    """Distance between boxes and bodies in one view, in gates; infinite from 1 on.
+    """Distance between boxes and bodies in one view, in gates, infinite from 1 on, float64 (n, b).
 
-    Parameters
-    ----------
-    table
-        The view.
-    ground : float64 (n, 2), height : float64 (n,)
-        Metres.
-    boxes : float64 (b, 4)
-        Pixels.
-
-    Returns
-    -------
-    float64 (n, b)
+    Ground float64 (n, 2) and height float64 (n,) are in metres, boxes float64 (b, 4) in pixels.
     """
     body = table.boxes_of(ground, height)
     pixel_height = (body[:, 3] - body[:, 1])[:, None]
@@ -181,19 +163,10 @@ _MIN_FILL = 0.25
 
 
 def isolated_boxes(evidence: Boxes | Singles | None, size: tuple[int, int]) -> Floats:
-    """Boxes of one view and frame.
+    """Boxes of one view and frame: left, top, right, bottom in pixels, float64 (n, 4).
 
-    Parameters
-    ----------
-    evidence
-        Boxes, a likelihood map float32 (v, u), or None where the view is blind.
-    size
-        Width and height of the image, pixels.
-
-    Returns
-    -------
-    float64 (n, 4)
-        left, top, right, bottom, pixels.
+    The evidence is boxes, a likelihood map float32 (v, u), or None where the view is blind; `size` is the width and
+    height of the image, pixels.
     """
     if evidence is None:
         return np.zeros((0, 4))

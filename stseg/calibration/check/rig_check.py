@@ -55,13 +55,7 @@ class Check:
 
 
 def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
-    """Compare each view with the others.
-
-    Parameters
-    ----------
-    boxes_by_frame
-        Boxes of every view in consecutive frames, see `isolated_boxes`.
-    """
+    """Compare each view with the others by the boxes of every view in consecutive frames (`isolated_boxes`)."""
     tables, frames = tables_of(rig), sorted(boxes_by_frame)
     frames = [frames[k] for k in even_rows(len(frames), _MAX_FRAMES)]
     people = match_frames(rig, tables, boxes_by_frame, frames)

@@ -18,16 +18,7 @@ def fit_radial_lens(pose: ModelFit, free: ModelFit, points: Points) -> ModelFit 
     """The pose with k1, or k1 and k2, where they are significant; None where none is, or a free camera fits better.
 
     The F test of nested models, each coefficient in its turn; its evidence must not hang on the one point that fits
-    worst without it, which may be wrong.
-
-    Parameters
-    ----------
-    pose
-        The fit without a lens, of unknowns as in `pose_model`.
-    free
-        That of a free camera.
-    points
-        All points.
+    worst without it, which may be wrong. `pose` is the fit without a lens (`pose_model`), `free` that of a free camera.
     """
     found, plain = None, pose
     for _ in range(_COEFFICIENTS if len(points.pixel) >= MIN_POINTS else 0):

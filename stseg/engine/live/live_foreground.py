@@ -19,13 +19,7 @@ from stseg.io.recording.recording import Recording
 
 
 class LiveForegrounds:
-    """Background models and foreground of every camera of a recording in progress.
-
-    Parameters
-    ----------
-    recording, config
-        The streams, and the constants of all stages.
-    """
+    """Background models and foreground of every camera of a recording in progress."""
 
     def __init__(self, recording: Recording, config: Config) -> None:
         self._recording, self._config = recording, config
@@ -49,17 +43,9 @@ class LiveForegrounds:
         return [self._recording.rig.cameras[k].name for k in sorted(self._untrained)]
 
     def learn(self, frame_sets: Iterable[FrameSet]) -> int:
-        """Train the backgrounds of the cameras without an empty scene.
+        """Train the backgrounds of the cameras without an empty scene; returns the number of frame sets consumed.
 
-        Parameters
-        ----------
-        frame_sets
-            The first frame sets, of which at most `live.background_time` seconds are consumed.
-
-        Returns
-        -------
-        int
-            Number of frame sets consumed.
+        These are the first ones, of which at most `live.background_time` seconds are consumed.
         """
         frames = max(1, round(self._config.live.background_time * self._recording.rig.frame_rate))
         step = sampled(range(frames), self._config.segments).step
@@ -80,12 +66,7 @@ class LiveForegrounds:
     def update(self, frame_set: FrameSet, since: int) -> None:
         """Update the backgrounds by the next frame set, where it is one of the training frames.
 
-        Parameters
-        ----------
-        frame_set
-            The next frame set.
-        since
-            First frame of the first background period.
+        `since` is the first frame of the first background period.
         """
         offset = (frame_set.frame - since) % self._part
         if offset == 0:

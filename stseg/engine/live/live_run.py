@@ -99,14 +99,9 @@ class LiveRun:
         return f", published {median(self._delays):.1f} s after arrival (median; at most {max(self._delays):.1f} s)"
 
     def begin(self, plan: Iterator[Segment], since: int) -> None:
-        """Set the plan of segments.
+        """Set the plan of segments in their order; the first begins with the first frame set.
 
-        Parameters
-        ----------
-        plan
-            The segments in their order; the first begins with the first frame set.
-        since
-            First frame of the first background period.
+        `since` is the first frame of the first background period.
         """
         self._plan, self._coming, self._since = plan, next(plan), since
         self._published = self._coming.first

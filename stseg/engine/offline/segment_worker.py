@@ -17,15 +17,7 @@ from stseg.io.recording.frames import open_frames
 
 
 class SegmentWorker:
-    """Makes segments of one job, any of them in any order.
-
-    Parameters
-    ----------
-    job
-        The run.
-    cores
-        Processor cores for this worker, asked at each frame; see `run_session`.
-    """
+    """Makes segments of one job, any of them in any order; `cores` is asked at each frame, see `run_session`."""
 
     def __init__(self, job: Job, cores: Callable[[], int] = two_cores) -> None:
         self.job, self.pipeline, self.cores = job, job.pipeline(), cores
@@ -35,21 +27,9 @@ class SegmentWorker:
         self._learned_from: BackgroundFrames | None = None
 
     def make(self, segment: Segment, draft: Path, advance: Advance) -> Path:
-        """Track a segment and write its file.
+        """Track a segment, write its file as a draft, and return the finished file, whose name has its checksum.
 
-        Parameters
-        ----------
-        segment
-            Its frames.
-        draft
-            Path of the file while it is written.
-        advance
-            Called with the number of further frames of the segment that were fused.
-
-        Returns
-        -------
-        Path
-            The finished file, whose name has its checksum.
+        `advance` is called with the number of further frames of the segment that were fused.
         """
         job = self.job
 

@@ -66,16 +66,9 @@ class SegmentWriter(ExitStack):
         )
 
     def write(self, step: CommittedFrames, events: Rows | None = None, executor: Executor | None = None) -> None:
-        """Append committed frames; the last step may be packed until the next is written.
+        """Append the next committed frames, with further EVENT rows (k,) of theirs; the last may be packed later.
 
-        Parameters
-        ----------
-        step
-            The next committed frames.
-        events : EVENT (k,), or None
-            Further events of these frames.
-        executor
-            One thread that packs volumes; None to pack them here.
+        One thread of the executor packs volumes; without one they are packed here.
         """
         first, stop = self.segment.first, self.segment.stop
         results, trajectory = step.within(first, stop), step.within(self.segment.lead, stop).commit.trajectory

@@ -128,19 +128,10 @@ def _middle(frame_rate: float, config: Config, first: int, stop: int) -> int | N
 
 
 def endless_segments(frame_rate: float, config: Config, first: int, index: int = 0) -> Iterator[Segment]:
-    """Segments of a run of unknown length.
+    """Segments of a run of unknown length from a frame on; `index` is the number of the first one.
 
     A segment stays open until the frames of a window have followed it. If the run ends before, it is the last segment,
     and includes the frames that have followed.
-
-    Parameters
-    ----------
-    frame_rate, config
-        As of `segments`.
-    first
-        First frame of the run.
-    index
-        Number of the first segment.
     """
     lengths = _lengths(frame_rate, config)
     begin = lead = first

@@ -56,17 +56,7 @@ class Drawing:
 
 
 class Viewer:
-    """A camera in a scene.
-
-    Parameters
-    ----------
-    spec
-        The scene.
-    camera
-        The view.
-    turn
-        Its place in the ring, see `stseg.simulation.rendering.cameras.turns`.
-    """
+    """A camera in a scene; `turn` is its place in the ring, see `stseg.simulation.rendering.cameras.turns`."""
 
     def __init__(self, spec: SceneSpec, camera: Camera, turn: float) -> None:
         self.camera = camera

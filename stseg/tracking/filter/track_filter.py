@@ -143,15 +143,7 @@ class TrackState(NamedTuple):
 
 
 class TrackFilter:
-    """All current tracks: predicted for a frame, corrected by its detections, kept while undetected within patience.
-
-    Parameters
-    ----------
-    frame_rate
-        Frames per second.
-    config
-        The constants of all stages: body, motion, detection and tracking.
-    """
+    """All current tracks: predicted for a frame, corrected by its detections, kept while undetected within patience."""
 
     def __init__(self, frame_rate: float, config: Config) -> None:
         self.frame_rate = frame_rate
