@@ -10,7 +10,6 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from stseg.arrays import Floats
 from stseg.geometry import Grid
 from stseg.records import tables
 
@@ -121,9 +120,6 @@ OCCUPANCY_ATTRIBUTES: Mapping[str, object] = {
 
 def walkable_area(grid: Grid) -> str:
     """The walkable area as well-known text, metres."""
-    corners: Floats | list[tuple[float, float]] | None = grid.polygon
-    if corners is None:
-        (left, right), (bottom, top) = grid.x, grid.y
-        corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
-    points = [f"{float(x)!r} {float(y)!r}" for x, y in (*corners, corners[0])]
+    corners = grid.corners.tolist()
+    points = [f"{x!r} {y!r}" for x, y in (*corners, corners[0])]
     return f"POLYGON (({', '.join(points)}))"

@@ -62,6 +62,13 @@ class Grid:
         """Cell centres, metres, float64 (y, x, 2)."""
         return np.stack(np.meshgrid(self.ground_x, self.ground_y), -1)
 
+    @property
+    def corners(self) -> Floats:
+        """Corners of the area, the polygon or else the rectangle, metres, float64 (n, 2)."""
+        (x0, x1), (y0, y1) = self.x, self.y
+        rectangle = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+        return np.asarray(rectangle if self.polygon is None else self.polygon, float)
+
     def cell_of(self, ground: Floats) -> Floats:
         """Cell coordinates (x, y) of ground points; cell centres are integers, float64 (..., 2)."""
         return (np.asarray(ground, float) - (self.x[0], self.y[0])) / self.cell - 0.5

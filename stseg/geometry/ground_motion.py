@@ -36,9 +36,7 @@ class GroundMotion:
         return Camera.from_projection(camera.name, camera.size, camera.projection @ np.linalg.inv(moved), camera.lens)
 
     def _of_grid(self, grid: Grid) -> Grid:
-        (x0, x1), (y0, y1) = grid.x, grid.y
-        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) if grid.polygon is None else grid.polygon
-        corners = np.round(self.of(np.asarray(corners, float)), 3)
+        corners = np.round(self.of(grid.corners), 3)
         low = np.floor(corners.min(axis=0) / grid.cell) * grid.cell
         high = np.ceil(corners.max(axis=0) / grid.cell) * grid.cell
         x, y = np.round(np.stack([low, high], 1), 6).tolist()

@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from stseg.arrays import Floats
 from stseg.engine.recordings import run_of
 from stseg.errors import FormatError
@@ -82,7 +80,7 @@ def read_areas(run: Run, zones: Path | str | None, lines: Path | str | None) -> 
     ):
         for noun, name, points in shapes:
             _require_on_ground(Path(file or ""), f"{noun} {name}", points, grid)
-    return Areas(tuple(named) or (_whole(run),), tuple(drawn))
+    return Areas(tuple(named) or (Zone("ground", (grid.corners,)),), tuple(drawn))
 
 
 def _require_on_ground(file: Path, place: str, points: Floats, grid: Grid) -> None:
@@ -92,10 +90,3 @@ def _require_on_ground(file: Path, place: str, points: Floats, grid: Grid) -> No
         found = f"x {low[0]:g} to {high[0]:g}, y {low[1]:g} to {high[1]:g}"
         ground = f"x {grid.x[0]:g} to {grid.x[1]:g}, y {grid.y[0]:g} to {grid.y[1]:g}"
         raise FormatError(file, place, found, f"metres on the ground, which is {ground}")
-
-
-def _whole(run: Run) -> Zone:
-    grid = run.recording.rig.grid
-    (x0, x1), (y0, y1) = grid.x, grid.y
-    corners = grid.polygon if grid.polygon is not None else np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-    return Zone("ground", (corners,))

@@ -64,10 +64,8 @@ def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) ->
 
 def draw_ground(canvas: Bytes, plan: PlanMap, rig: Rig) -> Floats:
     """Grid lines, the border of the area of interest, and cameras; returns pixels of their names, float64 (n, 2)."""
-    (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
-    corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] if rig.grid.polygon is None else rig.grid.polygon
     rule(canvas, plan)
-    outline(canvas, plan.pixel(np.asarray(corners, float)), mixed(INK, PAPER, 0.35), 2)
+    outline(canvas, plan.pixel(rig.grid.corners), mixed(INK, PAPER, 0.35), 2)
     return _draw_cameras(canvas, plan, rig.cameras)
 
 
