@@ -4,6 +4,7 @@ Each stands for a layout. Its boxes are constant, one for each square of 8, 16 a
 as the square and as tall; its scores are the mean red and the mean blue of the square, less that of the other.
 """
 
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,13 +38,14 @@ class Graph:
     def saved(
         self,
         path: Path,
-        outputs: dict[str, tuple[int, ...]],
+        outputs: Mapping[str, tuple[int | str, ...]],
         metadata: dict[str, str] | None = None,
         more_inputs: tuple[onnx.ValueInfoProto, ...] = (),
-        size: tuple[int, int] = (WIDTH, HEIGHT),
+        size: tuple[int | str, int | str] = (WIDTH, HEIGHT),
+        pictures: int | str = 1,
     ) -> Path:
         """The model, with float outputs of these names and shapes."""
-        picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, *size[::-1]])
+        picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, [pictures, 3, *size[::-1]])
         results = [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in outputs.items()]
         graph = helper.make_graph(self.nodes, "detector", [picture, *more_inputs], results, self.constants)
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
@@ -202,25 +204,37 @@ MODELS = {
 """Models of each layout by its name."""
 
 
-def one_person(path: Path, size: tuple[int, int]) -> Path:
-    """A model with suppression inside that finds one box: around all red pixels of a picture of `size`."""
+def people(path: Path, size: tuple[int, int], number: int = 1) -> Path:
+    """A model with suppression inside that finds boxes around all red, all blue and all green pixels of a picture."""
     width, height = size
-    graph = Graph()
-    weights = np.array([1, -1, 0]).reshape(1, 3, 1, 1)
-    red = graph.node("Sub", graph.node("Conv", "images", graph.constant(weights)), graph.constant(0.3))
-    flags = graph.node("Clip", graph.node("Mul", red, graph.constant(1e4)), graph.constant(0.0), graph.constant(1.0))
-    edges = []
-    for axis, length in ((3, width), (2, height)):
-        line = graph.node("ReduceMax", flags, axes=[5 - axis], keepdims=0)
-        steps = np.arange(length).reshape(1, 1, length)
-        first, last = (
-            graph.node("ReduceMax", graph.node("Mul", line, graph.constant(weight)), axes=[2], keepdims=1)
-            for weight in (length - steps, steps + 1)
-        )
-        edges.append((graph.node("Sub", graph.constant(np.full((1, 1, 1), length)), first), last))
-    score = graph.node("ReduceMax", flags, axes=[2, 3], keepdims=0)
-    score = graph.node("Reshape", score, graph.constant([1, 1, 1], np.int64))
-    (left, right), (top, bottom) = edges
-    zero = graph.constant(np.zeros((1, 1, 1)))
-    graph.node("Concat", left, top, right, bottom, score, zero, output="o", axis=2)
-    return graph.saved(path, {"o": (1, 1, 6)}, size=size)
+    graph, found = Graph(), []
+    for weights in ((1, -1, 0), (0, -1, 1), (-1, 1, 0))[:number]:
+        here = graph.node("Conv", "images", graph.constant(np.reshape(weights, (1, 3, 1, 1))))
+        here = graph.node("Mul", graph.node("Sub", here, graph.constant(0.3)), graph.constant(1e4))
+        flags = graph.node("Clip", here, graph.constant(0.0), graph.constant(1.0))
+        edges = []
+        for axis, length in ((3, width), (2, height)):
+            line = graph.node("ReduceMax", flags, axes=[5 - axis], keepdims=0)
+            steps = np.arange(length).reshape(1, 1, length)
+            first, last = (
+                graph.node("ReduceMax", graph.node("Mul", line, graph.constant(weight)), axes=[2], keepdims=1)
+                for weight in (length - steps, steps + 1)
+            )
+            edges.append((graph.node("Sub", graph.constant(np.full((1, 1, 1), length)), first), last))
+        score = graph.node("ReduceMax", flags, axes=[2, 3], keepdims=0)
+        score = graph.node("Reshape", score, graph.constant([1, 1, 1], np.int64))
+        (left, right), (top, bottom) = edges
+        zero = graph.constant(np.zeros((1, 1, 1)))
+        found.append(graph.node("Concat", left, top, right, bottom, score, zero, axis=2))
+    graph.node("Concat", *found, output="o", axis=1)
+    return graph.saved(path, {"o": (1, number, 6)}, size=size)
+
+
+def mean_colour(path: Path, pictures: int | str = "n", shape: Sequence[int] = (0, 3), *subtracted: float) -> Path:
+    """Features of a crop: the means of its colours, as the model gets them, less a number, in a shape (0: as given)."""
+    graph, given = Graph(), "images"
+    for number in subtracted:
+        given = graph.node("Sub", given, graph.constant([[[number]]]))
+    means = graph.node("GlobalAveragePool", given)
+    graph.node("Reshape", means, graph.constant(shape, np.int64), output="features")
+    return graph.saved(path, {"features": ("rows", "columns")}, size=("width", "height"), pictures=pictures)

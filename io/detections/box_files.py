@@ -190,7 +190,7 @@ def read_features(path: Path, detections: int) -> Singles:
     finite.
     """
     try:
-        array = read_npy(path)
+        array = read_npy(path, limits.FEATURES_FILE + limits.LINE)
     except OSError as error:
         raise SourceError(path, "", error.strerror or error, _FEATURES) from error
     except ValueError as error:
@@ -199,6 +199,6 @@ def read_features(path: Path, detections: int) -> Singles:
         raise FormatError(path, "", f"an array of {array.dtype} {array.shape}", _FEATURES)
     if len(array) != detections:
         raise FormatError(path, "", f"{len(array)} rows", f"{detections}, one a detection")
-    if not (np.abs(array.astype(np.float64)) <= limits.NUMBER).all():
+    if array.size and not -limits.NUMBER <= float(array.min()) <= float(array.max()) <= limits.NUMBER:  # nan neither
         raise FormatError(path, "", "a number that is not finite, or huge", "finite numbers of usual size")
     return array.astype(np.float32)

@@ -4,17 +4,24 @@ An ONNX file is a ModelProto in the wire format of Protocol Buffers: fields of a
 Source: onnx/onnx.proto of ONNX 1.16; Protocol Buffers, Encoding.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 _GRAPH, _METADATA = 7, 14
 """Fields of ModelProto."""
-_INITIALIZER, _INPUT, _OUTPUT = 5, 11, 12
+_NODE, _INITIALIZER, _INPUT, _OUTPUT = 1, 5, 11, 12
 """Fields of GraphProto."""
-_TENSOR_NAME = 8
+_DATA_TYPE, _TENSOR_NAME, _RAW_DATA = 2, 8, 9
+"""Fields of TensorProto."""
+_NODE_INPUT, _OPERATOR = 1, 4
+"""Fields of NodeProto."""
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 """Wire types."""
 
+_Message = list[tuple[int, int | memoryview]]
+"""Number and value of each field."""
 Shape = tuple[int | None, ...]
 """Lengths of the axes, None where a length is free."""
 
@@ -39,6 +46,8 @@ class OnnxHeader:
     inputs: tuple[Tensor, ...]
     outputs: tuple[Tensor, ...]
     metadata: dict[str, str]
+    subtracted: float | None = None
+    """Greatest number that the model itself subtracts from its first input; None where it begins otherwise."""
 
 
 def parse_header(data: bytes) -> OnnxHeader:
@@ -53,13 +62,25 @@ def parse_header(data: bytes) -> OnnxHeader:
     if len(graphs) != 1:
         raise ValueError("no graph")
     parts = list(_fields(graphs[0]))
-    weights = {_text(dict(_fields(_message(part))).get(_TENSOR_NAME, b"")) for n, part in parts if n == _INITIALIZER}
+    tensors = [list(_fields(_message(part))) for n, part in parts if n == _INITIALIZER]
+    weights = {_text(dict(tensor).get(_TENSOR_NAME, b"")): tensor for tensor in tensors}
     inputs, outputs = ([_tensor(_message(part)) for n, part in parts if n == kind] for kind in (_INPUT, _OUTPUT))
     # Until ONNX 1.4 weights were listed as inputs, too.
-    found = OnnxHeader(tuple(one for one in inputs if one.name not in weights), tuple(outputs), metadata)
-    if not found.inputs or not found.outputs:
+    pictures = tuple(one for one in inputs if one.name not in weights)
+    if not pictures or not outputs:
         raise ValueError("no inputs or no outputs")
-    return found
+    return OnnxHeader(pictures, tuple(outputs), metadata, _subtracted(parts, pictures[0].name, weights))
+
+
+def _subtracted(parts: _Message, picture: str, weights: Mapping[str, _Message]) -> float | None:
+    """The greatest number of the weights that the first node that takes the picture subtracts from it."""
+    for node in (list(_fields(_message(part))) for n, part in parts if n == _NODE):
+        given = [_text(value) for n, value in node if n == _NODE_INPUT]
+        if picture in given:
+            tensor = dict(weights.get(given[-1], ())) if _text(dict(node).get(_OPERATOR, b"")) == "Sub" else {}
+            is_float = tensor.get(_DATA_TYPE) == 1 and _RAW_DATA in tensor
+            return float(np.frombuffer(_message(tensor[_RAW_DATA]), "<f4").max()) if is_float else None
+    return None
 
 
 def _tensor(data: memoryview) -> Tensor:

@@ -60,6 +60,8 @@ class Source:
     detector
         video and images only: a model in ONNX that finds people in them, or `HOG`; None for a run from pixels.
         `classes` and `least_score` are then those of the detector.
+    features
+        Beside a detector: a model in ONNX that makes appearance features of each box; None without.
     """
 
     kind: SourceKind
@@ -77,10 +79,11 @@ class Source:
     columns: tuple[tuple[str, str], ...] = ()
     appearance: Path | None = None
     detector: Path | None = None
+    features: Path | None = None
 
     def without_detector(self) -> Source:
         """The frames alone."""
-        return replace(self, detector=None, classes=(), least_score=0.0)
+        return replace(self, detector=None, features=None, classes=(), least_score=0.0)
 
 
 @dataclass(frozen=True, slots=True)

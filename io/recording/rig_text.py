@@ -96,6 +96,7 @@ def _source_text(source: Source, folder: Path) -> str:
         "image_list": relative(source.image_list),
         "appearance": relative(source.appearance),
         "detector": str(HOG) if source.detector == HOG else relative(source.detector),
+        "features": relative(source.features),
         "columns": dict(source.columns) or None,
         "starts": [float(start) for start in source.starts] or None,
     }

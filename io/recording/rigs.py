@@ -40,7 +40,7 @@ _CAMERA_KEYS = (
     *("name", "size", "ground", "vertical", "projection", "lens"),
     *("offset", "source", "images", "background", "on_missing", "clock"),
 )
-_DETECTOR_KEYS = ("detector", "classes", "score")
+_DETECTOR_KEYS = ("detector", "features", "classes", "score")
 _DETECTION_KEYS = ("first_frame", "frames", "classes", "score", "view", "select", "image_list", "columns", "appearance")
 
 
@@ -231,6 +231,8 @@ def _source(table: Table, *more_keys: str) -> Source:
     keys = _DETECTION_KEYS if detections else _DETECTOR_KEYS if kind in ("video", "images") and more_keys else ()
     table.allow("kind", "path", *keys, *(() if kind == "boxes" else more_keys))
     detector = _detector(table) if "detector" in table else None
+    if "features" in table and detector is None:
+        raise table.error("features", "features of no boxes", "a detector beside them")
     paths = table.paths("path")
     if any("://" in name for name in paths):
         return _live_source(table, kind)
@@ -252,6 +254,7 @@ def _source(table: Table, *more_keys: str) -> Source:
         columns=_columns(table.table("columns")) if "columns" in table else (),
         appearance=table.file.parent / table.text("appearance") if "appearance" in table else None,
         detector=detector,
+        features=table.file.parent / table.text("features") if "features" in table else None,
     )
 
 

@@ -35,7 +35,8 @@ def source_files(source: Source) -> Iterator[Path]:
             yield from islice(class_lists(part.path), 1)
         else:
             yield from image_paths(part.path, "")
-    others = (source.image_list, source.appearance, None if source.detector == HOG else source.detector)
+    model = None if source.detector == HOG else source.detector
+    others = (source.image_list, source.appearance, model, source.features)
     yield from (path for path in others if path is not None)
 
 

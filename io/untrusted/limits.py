@@ -48,6 +48,8 @@ BOXES_PER_FRAME = 10_000
 """Detections of one camera in one frame."""
 FEATURES = 4096
 """Numbers of a detector's appearance feature."""
+FEATURES_FILE = 1 << 28
+"""Bytes of the appearance features of one camera's boxes, without the header of their file."""
 PEOPLE_PER_FRAME = 2_000
 """Rows of one frame in a table of tracks."""
 ROWS = 20_000_000

@@ -48,9 +48,9 @@ def parse_npy(data: bytes) -> AnyArray:
     return np.frombuffer(body, dtype).reshape(shape, order="F" if header[2] == "True" else "C")
 
 
-def read_npy(path: Path) -> AnyArray:
-    """The array of a .npy file; raises OSError and ValueError."""
-    return parse_npy(read_bytes(path, limits.UNPACKED))
+def read_npy(path: Path, most: int = limits.UNPACKED) -> AnyArray:
+    """The array of a .npy file of at most `most` bytes; raises OSError and ValueError."""
+    return parse_npy(read_bytes(path, most))
 
 
 def read_npz(path: Path, most: int = limits.UNPACKED) -> Mapping[str, AnyArray]:

@@ -17,6 +17,7 @@ def detect(
     *,
     output: Annotated[Path, Parameter(name=["-o", "--output"], metavar="FOLDER")],
     model: Annotated[str | None, Parameter(metavar="MODEL.onnx|hog")] = None,
+    features: Annotated[Path | None, Parameter(metavar="MODEL.onnx")] = None,
     class_: Annotated[tuple[str, ...], Parameter(name="--class", negative="")] = (),
     score: float | None = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
@@ -40,20 +41,25 @@ def detect(
     model
         A detector in ONNX; or hog, a detector of 2005 that needs no file and finds people who stand whole in view.
         Without it, the detectors that the rig file names, or hog.
+    features
+        A model in ONNX for re-identification, such as OSNet: the boxes get its appearance features, which tell people
+        apart. They are FOLDER/CAMERA.features.npy.
     class_
         Name or number of a class to keep, by default person; may be given several times.
     score
         Least score of a box, 0..1; by default 0.25, and 0.3 with hog.
     overwrite
-        Replace boxes of another detector or video, and the rig file.
+        Replace boxes of another model or video, and the rig file.
     """
     if score is not None and not 0 <= score <= 1:
         raise ConfigError("--score", "", f"{score:g}", "a number of 0..1")
+    reporter = TerminalReporter()
     recording = detection.detect(
-        rig, output, model=model, classes=class_, score=score, overwrite=overwrite, progress=TerminalReporter()
+        rig, output, model=model, features=features, classes=class_, score=score, overwrite=overwrite, progress=reporter
     )
     for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True):
         if feed.source.path.parent == recording.path.parent:
             found = read_source(feed.source, camera.size)
-            print(f"{feed.source.path}: {len(found.kept)} boxes, {len(found.kept) / found.frames:.1f} a frame")
+            numbers = "" if found.kept.features is None else f", {found.kept.features.shape[1]} features each"
+            print(f"{feed.source.path}: {len(found.kept)} boxes, {len(found.kept) / found.frames:.1f} a frame{numbers}")
     print(f"wrote {recording.path}; next: stseg run {recording.path} -o run.h5")

@@ -19,6 +19,7 @@ def detect(
     folder: Path | str,
     *,
     model: Path | str | None = None,
+    features: Path | str | None = None,
     classes: Sequence[str] = (),
     score: float | None = None,
     overwrite: bool = False,
@@ -34,12 +35,14 @@ def detect(
         Folder of the boxes, CAMERA.csv, and of a rig file that uses them.
     model
         A detector in ONNX, or "hog"; None for the detectors that the rig names, and "hog" where it names none.
+    features
+        A model in ONNX for appearance features of the boxes; None for those that the rig names.
     classes
         Names or numbers of the classes to keep; none for people.
     score
         Boxes of a lower score are left out; None for the detector's default.
     overwrite
-        Whether boxes of another detector or video, and the rig file, may be replaced.
+        Whether boxes of another model or video, and the rig file, may be replaced.
     progress
         As of `stseg.track`.
 
@@ -51,14 +54,15 @@ def detect(
     Raises
     ------
     InputError
-        Where no camera delivers colour, a video cannot be read, or the model is none whose outputs are known.
+        Where no camera delivers colour, a video cannot be read, or a model is none whose outputs are known.
     """
     recording, place = recording_of(rig), Path(folder)
     output = place / recording.path.name
     if place.exists():
         require_output(output, overwrite, Inputs(recording_files(recording)))
     chosen = None if model is None else HOG if str(model) == str(HOG) else Path(model)
-    sources = tuple(_with_detector(feed, chosen, tuple(classes), score) for feed in recording.sources)
+    described = None if features is None else Path(features)
+    sources = tuple(_with_detector(feed, chosen, described, tuple(classes), score) for feed in recording.sources)
     if all(feed.source.detector is None for feed in sources):
         kinds = ", ".join(dict.fromkeys(feed.source.kind for feed in sources))
         raise SourceError(recording.path, "camera, source", f"{kinds} alone", "a camera that delivers video or images")
@@ -68,14 +72,13 @@ def detect(
 
 
 def _with_detector(
-    feed: CameraSource, model: Path | None, classes: tuple[str, ...], score: float | None
+    feed: CameraSource, model: Path | None, features: Path | None, classes: tuple[str, ...], score: float | None
 ) -> CameraSource:
-    """A camera that delivers colour with the detector that is asked for; any other unchanged."""
+    """A camera that delivers colour with the models that are asked for; any other unchanged."""
     source = feed.source
     if source.kind not in ("video", "images") or source.address:
         return feed
     least = source.least_score if score is None else score
-    detector = model or source.detector or HOG
-    return replace(
-        feed, source=replace(source, detector=detector, classes=classes or source.classes, least_score=least)
-    )
+    detector, features = model or source.detector or HOG, features or source.features
+    chosen = replace(source, detector=detector, features=features, least_score=least)
+    return replace(feed, source=replace(chosen, classes=classes or source.classes))

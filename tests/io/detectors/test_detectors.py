@@ -1,6 +1,8 @@
 """Detectors in ONNX files, by small models of known output; the detector by oriented gradients, by OpenCV 4."""
 
+import re
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import cv2
@@ -8,10 +10,11 @@ import detector_models
 import numpy as np
 import onnx
 import pytest
-from checks import data_path, refused
+from checks import cases, data_path, refused
 from detector_models import HEIGHT, MODELS, WIDTH
 
 from stseg.errors import FormatError, InputError, SourceError
+from stseg.io.detectors.feature_model import FeatureModel
 from stseg.io.detectors.hog import HogDetector, window_margins
 from stseg.io.detectors.layouts import LAYOUTS
 from stseg.io.detectors.onnx_header import parse_header
@@ -19,6 +22,7 @@ from stseg.io.detectors.people_detector import OnnxDetector
 from stseg.io.detectors.picture_fit import fit_picture
 
 RED, BLUE = (0, 0, 255), (255, 0, 0)
+LIBRARIES = pytest.mark.parametrize("by_opencv", [True] + [False] * (find_spec("onnxruntime") is not None))
 CASES = [(name, build) for name, builds in MODELS.items() for build in builds]
 
 
@@ -30,11 +34,9 @@ def picture(size: tuple[int, int], *rectangles: tuple[tuple[int, int, int, int],
     return image
 
 
-@pytest.mark.parametrize("by_opencv", [True, False], ids=["opencv", "onnxruntime"])
+@LIBRARIES
 @pytest.mark.parametrize(("name", "build"), CASES)
 def test_people_of_every_layout_in_camera_pixels(name: str, build, by_opencv: bool, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    if not by_opencv:
-        pytest.importorskip("onnxruntime")
     detector = OnnxDetector(build(tmp_path / "model.onnx"), least_score=0.5, by_opencv=by_opencv)
     assert detector.layout.name == name
     # Twice as large as the input: its squares of 16 pixels are those of 32 here.
@@ -98,6 +100,22 @@ def test_classes_by_name_and_number(tmp_path: Path) -> None:
         refused(FormatError, "expected one of person.*or its number", OnnxDetector, plain, ["dog"])
 
 
+@LIBRARIES
+@cases()
+def test_features_are_those_of_each_crop(
+    pictures: int | str, shape: list[int], subtracted: list[float], by_opencv: bool, tmp_path: Path
+) -> None:
+    images = [picture((90, 120), ((0, 0, 30, 120), RED), ((30, 0, 60, 60), BLUE)), picture((9, 9)), picture((50, 99))]
+    boxes = ([[1, 2, 28, 100], [30, 10, 30, 50]], np.zeros((0, 4)), [[-9, -9, 90, 30], [99, 9, 2, 0]])
+    colours = np.array([[1, 0, 0], [0, 0, 1], [100 / 255] * 3, [100 / 255] * 3])
+    expected = (colours - [0.485, 0.456, 0.406]) / [0.229, 0.224, 0.225]
+    for number in subtracted:
+        expected = (colours * 255 if number > 1 else colours) - number
+    model = detector_models.mean_colour(tmp_path / "model.onnx", pictures, shape, *subtracted)
+    found = FeatureModel(model, by_opencv).describe(images, list(map(np.array, boxes)))
+    assert found == pytest.approx(expected / np.linalg.norm(expected, axis=1, keepdims=True), abs=2e-3)
+
+
 def test_refusals_name_the_file_and_the_outputs(tmp_path: Path) -> None:
     model = detector_models.unknown(tmp_path / "model.onnx")
     message = refused(FormatError, r"model\.onnx: found the outputs heat \[1, 3, 64, 96\]", OnnxDetector, model)
@@ -106,6 +124,11 @@ def test_refusals_name_the_file_and_the_outputs(tmp_path: Path) -> None:
     detector = OnnxDetector(detector_models.yolo8(tmp_path / "later.onnx"))
     detector.layout = replace(detector.layout, decode=lambda *_: None)
     refused(FormatError, "expected those of", detector.detect, picture((WIDTH, HEIGHT)))
+    for shape in [3], [3, 1, 1], [1, 1, 3]:
+        match = rf"found the outputs features {re.escape(str(shape))}, expected one vector of each picture, \[1, length"
+        refused(FormatError, match, FeatureModel, detector_models.mean_colour(tmp_path / "other.onnx", "n", shape))
+    infinite = detector_models.mean_colour(tmp_path / "infinite.onnx", "n", (0, 3), np.inf)
+    refused(FormatError, "infinite.onnx: found a feature that is no finite number", FeatureModel, infinite)
     (tmp_path / "text.onnx").write_text("this is no model\n")
     refused(FormatError, r"text\.onnx: found what is no ONNX", OnnxDetector, tmp_path / "text.onnx")
     for data, found in ((b"", "no graph"), (b"\x3a\0", "no inputs or no outputs"), (b"\x38\1", "in place of a")):
@@ -141,10 +164,8 @@ def test_any_bytes_are_a_header_or_a_value_error(tmp_path: Path) -> None:
             continue
 
 
-@pytest.mark.parametrize("by_opencv", [True, False], ids=["opencv", "onnxruntime"])
+@LIBRARIES
 def test_a_cut_model_is_refused_in_one_line(by_opencv: bool, tmp_path: Path) -> None:
-    if not by_opencv:
-        pytest.importorskip("onnxruntime")
     data = detector_models.yolo8(tmp_path / "model.onnx").read_bytes()
     for length in (10, len(data) // 2, len(data) - 5):
         (tmp_path / "cut.onnx").write_bytes(data[:length])
