@@ -20,6 +20,7 @@ from stseg.io.outputs.whole_files import (
     clear_frames,
     marked_png,
     output_errors,
+    require_empty,
     require_own_frames,
     write_quickly,
 )
@@ -31,9 +32,8 @@ _BYTE, _WORD = 255, 65535
 
 def require_label_folder(folder: Path, cameras: Sequence[str], overwrite: bool, inputs: Inputs) -> None:
     """Refuse a folder that holds something that may not be replaced, before any work is done; raises OutputError."""
+    require_empty(folder, overwrite)
     with output_errors(folder):
-        if folder.exists() and any(folder.iterdir()) and not overwrite:
-            raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
         for camera in cameras:
             require_own_frames(folder / camera, inputs)
 

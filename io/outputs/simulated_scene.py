@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Bytes, Rows
 from stseg.errors import OutputError
 from stseg.geometry import Camera, Rig
-from stseg.io.outputs.whole_files import clear_frames, marked_png
+from stseg.io.outputs.whole_files import clear_frames, marked_png, require_empty
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source, SourceKind
 from stseg.io.recording.rigs import write_rig
 from stseg.io.untrusted.bounded_files import is_regular
@@ -95,10 +95,9 @@ def write_scene(
     called after each frame. OutputError where the folder holds something already, or cannot be written to.
     """
     require_utf8(folder, "a video")
+    require_empty(folder, overwrite)
     with _as_output_error(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()) and not overwrite:
-            raise OutputError(folder, "", "files in it", "an empty folder, or leave to overwrite")
         if not is_regular(folder / _SCENE):
             for path in _outputs(folder, scene):
                 if os.path.lexists(path):

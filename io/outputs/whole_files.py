@@ -259,6 +259,13 @@ def write_file(path: Path, data: bytes, overwrite: bool = True) -> None:
         part.write_bytes(data)
 
 
+def require_empty(folder: Path, overwrite: bool) -> None:
+    """Refuse a folder that holds something, unless that may be overwritten, before any work; raises OutputError."""
+    with output_errors(folder):
+        if folder.exists() and any(folder.iterdir()) and not overwrite:
+            raise OutputError(folder, "", "files in it", "an empty folder, a new name, or --overwrite")
+
+
 def make_folder(path: Path) -> None:
     """Make a folder unless it exists; raises OutputError."""
     try:

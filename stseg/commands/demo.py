@@ -9,7 +9,7 @@ from stseg.commands.evaluate import evaluate
 from stseg.commands.report import report
 from stseg.commands.run import run
 from stseg.commands.simulate import simulate
-from stseg.errors import OutputError
+from stseg.io.outputs.whole_files import require_empty
 
 
 def demo(folder: Path = Path("stseg-demo"), /, *, overwrite: Annotated[bool, Parameter(negative="")] = False) -> None:
@@ -27,7 +27,7 @@ def demo(folder: Path = Path("stseg-demo"), /, *, overwrite: Annotated[bool, Par
     overwrite
         Write into a folder that is not empty.
     """
-    _require_empty(folder, overwrite)
+    require_empty(folder, overwrite)
     scene, run_file, page = folder / "scene", folder / "run.h5", folder / "report.html"
     simulate(scene, scene="demo", overwrite=overwrite)
     run(scene / "rig.toml", output=run_file, overwrite=overwrite)
@@ -36,15 +36,6 @@ def demo(folder: Path = Path("stseg-demo"), /, *, overwrite: Annotated[bool, Par
     truth, pictures = scene / "truth.csv", folder / "pictures"
     report(run_file, output=page, truth=truth, pictures=pictures, camera_images=True, overwrite=overwrite)
     print(_what_to_open(folder))
-
-
-def _require_empty(folder: Path, overwrite: bool) -> None:
-    """Refuse a folder that holds something before any work is done."""
-    try:
-        if folder.exists() and any(folder.iterdir()) and not overwrite:
-            raise OutputError(folder, "", "files in it", "an empty folder, a new name, or --overwrite")
-    except OSError as error:
-        raise OutputError(folder, "", error.strerror or error, "a folder that can be written to") from error
 
 
 def _what_to_open(folder: Path) -> str:
