@@ -96,11 +96,11 @@ _ROUND = np.linspace(0, 2 * np.pi, 13)[:-1]
 _BODY = np.array([(z, r) for z, r in ((0.0, 0.13), (0.3, 0.15), (0.5, 0.21), (0.8, 0.23), (0.9, 0.12), (1.0, 0.08))])
 
 
-def ring(views: int = 4) -> Rig:
-    """Cameras around five by five metres, at 5 frames a second."""
+def ring(views: int = 4, step: float = 0.2) -> Rig:
+    """Cameras around five by five metres, each so much higher than the last, at 5 frames a second."""
     turns = [2 * np.pi * k / views + 0.3 for k in range(views)]
     cameras = [
-        looking(f"cam{k + 1}", (5.5 * np.cos(turn), 5.5 * np.sin(turn), 2.4 + 0.2 * k), (0.1, 0, 0.9), SIZE, 420.0)
+        looking(f"cam{k + 1}", (5.5 * np.cos(turn), 5.5 * np.sin(turn), 2.4 + step * k), (0.1, 0, 0.9), SIZE, 420.0)
         for k, turn in enumerate(turns)
     ]
     return Rig("ring", 5.0, Grid((-2.5, 2.5), (-2.5, 2.5)), tuple(cameras))

@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Bytes, Flags, Floats, Ints, Observation
+from stseg.calibration.automatic.endpoints import even_rows
+from stseg.calibration.check.blunders import find_swapped_streams
+from stseg.calibration.check.box_correspondence import isolated_boxes
+from stseg.calibration.check.rig_check import swapped_text
 from stseg.config import BodyConfig
-from stseg.geometry import Camera, Grid
+from stseg.geometry import Camera, Grid, Rig
 from stseg.io.detections.source_detections import SourceDetections, read_source
 from stseg.io.outputs.whole_files import Inputs, make_folder, write_png
 from stseg.io.recording.aligned_stream import require_own_sources
@@ -31,6 +35,8 @@ _OUTSIDE_SHARE = 0.5
 """Share of feet outside the area from which there is a warning."""
 _BEYOND_SHARE = 0.05
 """The same of boxes that begin beyond the right or lower edge of the image."""
+_COMPARED_FRAMES = 200
+"""Frames, from all the recording, by which swapped cameras are found."""
 _FOOT, _FOOT_OF_CENTRE = (0.5, 1.0), (0.0, 0.5)
 """From left and top to the middle of the lower edge, in widths and heights; the same if they are a box's centre."""
 
@@ -64,6 +70,11 @@ class SourceSummary:
     def boxes(self) -> Floats:
         """Left, top, width and height of all boxes, pixels, float64 (n, 4); none of a source of pixels."""
         return np.zeros((0, 4)) if self.detections is None else self.detections.kept.pixel
+
+    def boxes_at(self, frame: int) -> Floats:
+        """Edges of the boxes in a frame of the recording, float64 (n, 4), see `isolated_boxes`."""
+        boxes = None if self.detections is None else self.detections.kept.at(frame - self.source.offset)
+        return isolated_boxes(boxes, self.camera.size)
 
     def row(self) -> tuple[str, ...]:
         """Format and contents in words, under `COLUMNS`."""
@@ -131,6 +142,8 @@ def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary])
     """One sentence for each number of a rig or its boxes that is probably a mistake."""
     names, rig = [camera.name for camera in recording.rig.cameras], recording.rig
     feet, by_centres = ([one.feet(foot) for one in summaries] for foot in (_FOOT, _FOOT_OF_CENTRE))
+    if swapped := _swapped(rig, summaries, np.unique(np.concatenate([frame for frame, _ in feet]))):
+        return swapped
     paces = (words for one in feet for words in pace_warnings(rig.frame_rate, *one, body_height(recording)))
     return [
         *scene_warnings(rig, body_height(recording)),
@@ -139,6 +152,14 @@ def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary])
         *list(paces)[:1],
         *agreement_warnings(rig.cameras, feet, by_centres),
     ]
+
+
+def _swapped(rig: Rig, summaries: Sequence[SourceSummary], frames: Ints) -> list[str]:
+    """A warning of two cameras whose boxes in some of these frames fit far better with their sources swapped."""
+    frames = frames[even_rows(len(frames), _COMPARED_FRAMES)]
+    boxes = {frame: [one.boxes_at(frame) for one in summaries] for frame in frames.tolist()}
+    found = find_swapped_streams(rig, boxes) if boxes else ()
+    return [swapped_text(rig, found)] if found else []
 
 
 def write_source_pictures(recording: Recording, summaries: list[SourceSummary], folder: Path, overwrite: bool) -> bool:

@@ -15,7 +15,7 @@ from simulated_people import SIZE, exchanged, moved, ring, shown, walkers
 
 from stseg import Boxes, Camera, Recording, Rig, Source, read_recording, write_rig
 from stseg.arrays import Floats
-from stseg.calibration.check.blunders import match_frames
+from stseg.calibration.check.blunders import find_swapped_streams, match_frames
 from stseg.calibration.check.box_correspondence import isolated_boxes, tables_of
 from stseg.calibration.check.leave_one_out import locate
 from stseg.calibration.check.rig_check import Check, check_rig, verdict_text
@@ -32,6 +32,7 @@ from stseg.io.recording.recording import CameraSource
 from stseg.reporting.pictures.overlay import grid_picture
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig
+from stseg.tasks.sources import recording_warnings, summarise_sources
 from stseg.tasks.warnings import explained_by_swap
 
 RIG = ring()
@@ -65,8 +66,7 @@ class TestPeople:
         people = match_frames(RIG, tables, SHOWN, range(0, 40, 4))
         assert 0.8 * 30 <= len(people) <= 33
         placed = locate(people, tables, range(4), 2)
-        true = WALK[people.frame]
-        off = np.hypot(*np.moveaxis(true[..., :2] - placed.ground[:, None], -1, 0)).min(axis=1)
+        off = np.hypot(*np.moveaxis(WALK[people.frame][..., :2] - placed.ground[:, None], -1, 0)).min(axis=1)
         assert np.median(off) < 0.03 and np.quantile(off, 0.9) < 0.1
         assert people.has_box.sum(axis=1).mean() > 3
         people = match_frames(RIG, tables_of(RIG), {0: [np.zeros((0, 4))] * 4}, [0])
@@ -117,21 +117,23 @@ class TestBlunders:
         check, words = judged(exchanged(RIG, 0, 1))
         assert check.swapped == ((0, 1),)
         assert words[0] == "cam1 and cam2 seem to be swapped: their frames fit far better the other way round"
-        check, words = judged(exchanged(RIG, 1, 3))
+        alike = ring(step=0.0)
+        check, words = judged(exchanged(alike, 1, 3), shown(alike, WALK))
         assert sorted(check.swapped) == [(0, 2), (1, 3)]
         assert "cam2 and cam4" in words[0] and "cam1 and cam3" in words[0] and ", or " in words[0]
+        crowd = shown(ring(7), walkers(60, 12))
+        assert find_swapped_streams(ring(7), crowd) == ()
+        assert find_swapped_streams(exchanged(ring(7), 0, 1), crowd) == ((0, 1),)
         elsewhere = shown(RIG, walkers(40, 3, seed=77))
         boxes = {frame: [*views[:3], elsewhere[frame][3]] for frame, views in SHOWN.items()}
         check, words = judged(RIG, boxes)
-        assert 3 in check.lost
-        assert any("cam4 shows only" in sentence for sentence in words)
+        assert 3 in check.lost and any("cam4 shows only" in sentence for sentence in words)
 
     @pytest.mark.parametrize(("view", "frames"), [(2, -3), *in_ci((0, 2))])
     def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
-        nothing = [np.zeros((0, 4))] * 4
         boxes = {frame: list(views) for frame, views in SHOWN.items()}
         for frame, views in boxes.items():
-            views[view] = SHOWN.get(frame - frames, nothing)[view]
+            views[view] = SHOWN.get(frame - frames, [np.zeros((0, 4))] * 4)[view]
         check, words = judged(RIG, boxes)
         assert [(one.view, one.frames) for one in check.delays] == [(view, frames)]
         side = "late" if frames > 0 else "early"
@@ -188,6 +190,11 @@ class TestCommand:
         assert explained_by_swap(recording, 0, said) == said and explained_by_swap(swapped, 0, []) == []
         (warning,) = explained_by_swap(swapped, 0, said)
         assert "cam2 and cam4" in warning and "seem to be swapped" in warning
+        assert (
+            explained_by_swap(swapped, 0, [], 0.3)
+            == recording_warnings(swapped, summarise_sources(swapped))
+            == [warning]
+        )
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from stseg.geometry.fits import homogeneous
 from stseg.geometry.rig import BODY_HEIGHT
 
 _MIN_HEIGHT, _MAX_HEIGHT = 1.35, 2.10
-MATCH_GATE = 0.35
+_MATCH_GATE = 0.35
 """Association gate: distance of a box's middle and top from the body's, in body heights (about 0.6 m)."""
 _OCCLUSION = 0.6
 """Share of a body's height that may be hidden at the feet."""
@@ -63,7 +63,8 @@ def match_boxes(rig: Rig, tables: Sequence[BodyTable], frame: int, boxes: Sequen
 
     `tables` are those of `tables_of`; boxes float64 (b, 4) of each view are left, top, right, bottom in pixels.
     """
-    ground, height = _candidates(rig, boxes)
+    found = [candidates(camera, rig.grid, part) for camera, part in zip(rig.cameras, boxes, strict=True)]
+    ground, height, _ = (np.concatenate(column) for column in zip(*found, strict=True))
     views = len(boxes)
     residual, which = np.full((len(ground), views), np.inf), np.full((len(ground), views), -1)
     for view, (table, view_boxes) in enumerate(zip(tables, boxes, strict=True)):
@@ -92,8 +93,8 @@ def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) ->
         top = np.abs(body[:, None, 1] - boxes[None, :, 1]) / pixel_height
         early = (body[:, None, 3] - boxes[None, :, 3]) / pixel_height
         widths = (boxes[:, 2] - boxes[:, 0])[None] / wide
-        off = np.hypot(middle, top) / MATCH_GATE
-        fits = (off < 1) & (early < _OCCLUSION) & (early > -MATCH_GATE) & (widths > _MIN_WIDTH) & (widths < _MAX_WIDTH)
+        off = np.hypot(middle, top) / _MATCH_GATE
+        fits = (off < 1) & (early < _OCCLUSION) & (early > -_MATCH_GATE) & (widths > _MIN_WIDTH) & (widths < _MAX_WIDTH)
         # Head and sides are inside the image.
         inside = (body[:, :2] > 0).all(axis=1) & (body[:, 2] < table.size[0] - 1) & (body[:, 1] < table.size[1] - 1)
     return np.where(fits & inside[:, None], off, np.inf)
@@ -106,23 +107,31 @@ def wholly_visible(table: BodyTable, ground: Floats, height: Floats) -> Flags:
         return np.asarray((body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1))
 
 
-def _candidates(rig: Rig, boxes: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Candidate ground points and heights of the boxes, float64 (n, 2) and (n,)."""
-    grounds, heights = [np.zeros((0, 2))], [np.zeros(0)]
-    for camera, view_boxes in zip(rig.cameras, boxes, strict=True):
-        if not len(view_boxes):
-            continue
-        middle = view_boxes[:, [0, 2]].mean(axis=1)
-        whole = view_boxes[:, 3] < camera.size[1] - 1 - _BORDER
-        foot = camera.back_project(np.stack([middle, view_boxes[:, 3]], -1))
-        height = np.where(whole, height_of(camera, foot, middle, view_boxes[:, 1]), np.nan)
-        by_head = camera.back_project(np.stack([middle, view_boxes[:, 1]], -1), BODY_HEIGHT)
-        grounds += [foot, by_head]
-        heights += [height, np.full(len(view_boxes), BODY_HEIGHT)]
-    ground, height = np.concatenate(grounds), np.concatenate(heights)
+def candidates(camera: Camera, grid: Grid, boxes: Floats) -> tuple[Floats, Floats, Ints]:
+    """Where people may stand of whom a view has these boxes.
+
+    Parameters
+    ----------
+    boxes : float64 (b, 4)
+        left, top, right, bottom, pixels.
+
+    Returns
+    -------
+    ground : float64 (n, 2), height : float64 (n,)
+        Metres.
+    box : int64 (n,)
+        Index of the box, of which some have two candidates and others none.
+    """
+    middle = boxes[:, [0, 2]].mean(axis=1)
+    whole = boxes[:, 3] < camera.size[1] - 1 - _BORDER
+    foot = camera.back_project(np.stack([middle, boxes[:, 3]], -1))
+    by_head = camera.back_project(np.stack([middle, boxes[:, 1]], -1), BODY_HEIGHT)
+    ground = np.concatenate([foot, by_head])
+    height = np.where(whole, height_of(camera, foot, middle, boxes[:, 1]), np.nan)
+    height = np.concatenate([height, np.full(len(boxes), BODY_HEIGHT)])
     with np.errstate(invalid="ignore"):
-        kept = (height > _MIN_HEIGHT) & (height < _MAX_HEIGHT) & _in_area(ground, rig.grid)
-    return ground[kept], height[kept]
+        kept = (height > _MIN_HEIGHT) & (height < _MAX_HEIGHT) & _in_area(ground, grid)
+    return ground[kept], height[kept], np.flatnonzero(kept) % max(len(boxes), 1)
 
 
 def height_of(camera: Camera, ground: Floats, u: Floats, top: Floats) -> Floats:

@@ -24,8 +24,6 @@ _MAX_FRAMES = 80
 """Greatest number of frames in use, evenly spread."""
 _MAX_DELAY = 1.0
 """Largest stream delay that is tested, seconds."""
-_SWAP_DISPLACEMENT = 1.5
-"""Displacement, in cells, from which swapped streams are tested."""
 _LOST_CONFIRMATION = 0.6
 """Share of the median confirmation rate below which a view counts as lost."""
 
@@ -60,14 +58,12 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
     frames = [frames[k] for k in even_rows(len(frames), _MAX_FRAMES)]
     people = match_frames(rig, tables, boxes_by_frame, frames)
     share = confirmations(tables, people)
+    if swapped := find_swapped_streams(rig, boxes_by_frame):
+        return Check(Verdict((None,) * len(tables), (), None), tuple(share.tolist()), (), swapped, (), len(people))
     lost: tuple[int, ...] = ()
-    if comparable := bool(np.isfinite(share).sum() > 1):
+    if np.isfinite(share).sum() > 1:
         lost = tuple(np.flatnonzero(share < _LOST_CONFIRMATION * np.nanmedian(share)).tolist())
     verdict = judge(rig, tables, people)
-    far = any(one.off > _SWAP_DISPLACEMENT * rig.grid.cell for one in verdict.named)
-    swapped = find_swapped_streams(rig, tables, boxes_by_frame, frames, people) if lost or far or not comparable else ()
-    if swapped:
-        return Check(Verdict((None,) * len(tables), (), None), tuple(share.tolist()), (), swapped, (), len(people))
     shifted: list[StreamDelay] = []
     most = max(1, round(_MAX_DELAY * rig.frame_rate))
     while (
@@ -97,8 +93,7 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
     names = [camera.name for camera in rig.cameras]
     sentences = []
     if check.swapped:
-        pairs = ", or ".join(" and ".join(names[view] for view in pair) for pair in check.swapped)
-        sentences.append(f"{pairs} seem to be swapped: their frames fit far better the other way round")
+        sentences.append(swapped_text(rig, check.swapped))
     for one in check.delays:
         side = "late" if one.frames > 0 else "early"
         sentences.append(
@@ -127,6 +122,12 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
             f"{names[worst.view]} most, by {100 * worst.off:.0f} cm"
         )
     return sentences
+
+
+def swapped_text(rig: Rig, swapped: Sequence[tuple[int, int]]) -> str:
+    """Sentence on pairs of views of which one has swapped streams."""
+    pairs = ", or ".join(" and ".join(rig.cameras[view].name for view in pair) for pair in swapped)
+    return f"{pairs} seem to be swapped: their frames fit far better the other way round"
 
 
 def disagreement_text(name: str, one: Disagreement) -> str:
