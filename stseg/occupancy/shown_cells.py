@@ -31,6 +31,8 @@ _MOST_PIXELS = 1 << 20
 """Pixels up to which a sum of levels fits into 32 bits; blocks with more are taken to show something."""
 _MOST_COUNTED = 1 << 15
 """Cells (n,) of which each stands for itself; of more, every second, third, ... block stands for the next ones."""
+_FEW_PIXELS, _LEAST_SHARE = 2, 0.1
+"""Pixels of a footprint that is read pixel by pixel, and share of such ones from which it is worth while."""
 _CODE_VIEWS = 60
 """Number of views with sets that one whole number codes."""
 
@@ -106,6 +108,9 @@ class CellTables:
         self.footprint, self.place = views.take(self.in_volume, 1), place.astype(np.int32)
         """int16 (view, cell, 4) and int32 (cell,), as `in_volume` (see `ShownCells`): of the cells that a view sees,
         in block order."""
+        is_small = (self.footprint[..., 3] == 1) & (self.footprint[..., 2] <= _FEW_PIXELS)
+        self.few = np.where(is_small.sum(1) > _LEAST_SHARE * len(place), _FEW_PIXELS, 0)
+        """int64 (view,): footprints of at most so many pixels in a row are read one by one; 0 where hardly any are."""
         self._width = np.add.reduceat(is_seen, start, dtype=np.int64)  # cells of each block
         self._first = (self._width.cumsum() - self._width).astype(np.int32)
         self._marked, self._cells = self.nothing_marked(), self._cells_of(self.nothing_marked())

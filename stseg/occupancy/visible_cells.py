@@ -62,12 +62,15 @@ def _hidden_pixels(
     assigned: PixelAssignment, left: int, top: int, width: int, height: int, person: int, distance: float
 ) -> int:
     """Pixels of a footprint that show a person other than `person`, nearer than a cell at `distance`."""
-    hidden = 0
+    # There is no branch: what it depends on is not foreseen. No person is infinitely far.
+    hidden, limit = 0, distance - SHOULDER
     for j in range(assigned.row[top], assigned.row[top + height - 1] + 1):
+        across = 0
         for i in range(assigned.column[left], assigned.column[left + width - 1] + 1):
-            other = assigned.raster[j, i]
-            if other >= 0 and other != person and assigned.distance[other + 1] < distance - SHOULDER:
-                hidden += _overlap(top, height, assigned.step, j) * _overlap(left, width, assigned.step, i)
+            other = assigned.raster[np.uint64(j), np.uint64(i)]
+            is_hidden = (assigned.distance[np.uint64(other + 1)] < limit) & (other != person)
+            across += is_hidden * _overlap(left, width, assigned.step, i)
+        hidden += across * _overlap(top, height, assigned.step, j)
     return hidden
 
 
@@ -101,7 +104,12 @@ def _others_inside(
 
 @kernel
 def mark_people(reach: Reach, assigned: PixelAssignment, marked: Flags) -> None:
-    """Mark the blocks (block,) with a person of a view in their boxes."""
+    """Mark the blocks (block,) with a person of a view in their boxes; `occupied`, 0 before, is filled first."""
+    for v in range(len(assigned.raster)):
+        total, line, above = np.int32(0), assigned.raster[v], assigned.occupied[v]
+        for u in range(len(line)):
+            total += np.int32(line[u] >= 0)
+            assigned.occupied[v + 1, u + 1] = above[u + 1] + total
     for b in range(len(marked)):
         left, top, right, bottom = reach[b]
         if right > 0 and not marked[b]:
@@ -159,15 +167,17 @@ def fill_map(
     table: SumTable,
     assigned: PixelAssignment,
     distance: Singles,
+    few: int,
     levels: Levels,
     share: Singles,
 ) -> None:
     """Fill levels and share (n,) of a view with a map in the marked blocks; elsewhere they are those of `fill_empty`.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background. The
-    parameters are those of `fill_share`.
+    parameters are those of `fill_share`; footprints of at most `few` pixels in a row are read pixel by pixel.
     """
-    pixels, columns = _shown_pixels(table, assigned), table.sums.shape[1] - 1
+    pixels = _shown_pixels(table, assigned) if few > 0 else np.empty(0, np.int32)
+    columns = table.sums.shape[1] - 1
     for b in range(len(cells.start) - 1):
         if not marked[np.uint64(cells.block[b])]:
             continue
@@ -175,7 +185,7 @@ def fill_map(
         for k in range(np.uint64(cells.start[b]), np.uint64(cells.start[b + 1])):
             left, top, width, height = footprint[np.uint64(k + shift)]
             nearest, far = cells.near_person[k], distance[np.uint64(place[np.uint64(k + shift)])]
-            if height == 1 and width <= 2:
+            if height == 1 and width <= few:
                 first = (top - table.top) * columns + left - table.left
                 levels[k], share[k] = _of_two_pixels(first, first + width - 1, nearest, far, pixels, assigned)
             else:

@@ -177,7 +177,8 @@ class Occupancy:
         footprint, unseen = tables.footprint[i], tables.unseen[i]
         if view.table is not None:
             fill_empty(cells, unseen, view.table.lowest, levels, share)
-            fill_map(cells, view.marked, tables.place, footprint, view.table, assignment, distance, levels, share)
+            at, few = (tables.place, footprint), tables.few[i]
+            fill_map(cells, view.marked, *at, view.table, assignment, distance, few, levels, share)
         elif view.fit is not None:
             fill_empty(cells, unseen, int(level_of_match(0.0, rates.miss, rates.clutter)), levels, share)
             fill_share(cells, view.marked, tables.place, footprint, assignment, distance, share)
@@ -227,7 +228,6 @@ class Occupancy:
         width, height = camera.size
         distance = np.append(np.inf, np.hypot(*(people.ground - camera.centre[:2]).T))
         occupied = np.zeros((raster.shape[0] + 1, raster.shape[1] + 1), np.int32)
-        np.cumsum((raster >= 0).cumsum(0, dtype=np.int32), 1, out=occupied[1:, 1:])
         return PixelAssignment(
             raster, occupied, step, _raster_lines(height, step), _raster_lines(width, step), distance, separate
         )
