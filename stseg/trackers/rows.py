@@ -50,8 +50,8 @@ def fill_views(rows: Rows, rig: Rig) -> None:
     grid, cell = rig.grid, np.rint(rig.grid.cell_of(np.column_stack([rows["x"], rows["y"]]))).astype(int)
     column, row = cell[:, 0].clip(0, grid.shape[2] - 1), cell[:, 1].clip(0, grid.shape[1] - 1)
     place = np.column_stack([grid.ground_x[column], grid.ground_y[row]])
-    views = [np.sum([camera.sees(place, height) for camera in rig.cameras], 0) for height in grid.heights]
-    rows["views"] = np.max(views, 0) * grid.contains(place)
+    views = np.sum([camera.sees(place, grid.heights[:, None]) for camera in rig.cameras], 0)
+    rows["views"] = views.max(0) * grid.contains(place)
 
 
 def event_rows(events: list[Event]) -> Rows:
