@@ -12,7 +12,6 @@ from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.bodies.box_fit import EDGE_GRAIN, TOLERANCE
 from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, ScoreParameters
 from stseg.graphcut.grid_energy import GridEnergy
-from stseg.noise.detection_rate_estimate import VISIBILITY_KNOTS
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.visible_cells import SHOULDER
 from stseg.records.people import Explanation
@@ -119,7 +118,8 @@ def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, parame
     gains: list[tuple[float, int, int]] = []
     for j in members:
         visible = boxes.inside[view, j] * math.prod(left_by_all(boxes)[view, j, k] for k in members)
-        found = float(np.interp(visible, VISIBILITY_KNOTS, parameters.found_share)) * (visible > 0)
+        share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
+        found = min(max(share, parameters.hidden_detection_rate), 1.0)
         missing = math.log(1 - (1 - parameters.box_miss_rate) * found)
         total += missing
         worth = parameters.box_log_ratio - missing

@@ -139,7 +139,13 @@ class BoxView(View):
         for row, bodies in zip(inside, self.bodies, strict=True):
             fill_inside(bodies, width, height, row)
         self.index = PillarIndex.of(self.bodies, camera.size)
-        self.found = np.where(inside > _LEAST_INSIDE, np.minimum(inside / config.full_visibility, 1.0), 0.0).reshape(-1)
+        self.found = np.where(inside > _LEAST_INSIDE, self.found_share(inside), 0.0).reshape(-1)
+
+    def found_share(self, visible: Floats) -> Floats:
+        """Detection rate of a body by its visible share, relative to that of a whole one."""
+        config = self.config
+        share = (visible - config.hidden_visibility) / (config.full_visibility - config.hidden_visibility)
+        return np.asarray(share.clip(config.hidden_detection_rate, 1.0))
 
     def observe(self, evidence: Boxes | Singles | None, noise: BoxNoise = PRIOR_NOISE) -> ViewObservation:
         """The frame's boxes."""

@@ -29,7 +29,6 @@ from stseg.detection.search.restarts import better_of, has_weak_members
 from stseg.geometry import Rig
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
-from stseg.noise.detection_rate_estimate import DetectionRateEstimate
 from stseg.noise.estimates import Estimates
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate
@@ -99,7 +98,6 @@ class Detector:
         return Estimates(
             BoxNoiseEstimate(rate, error_rates, self.body.stoutness),
             BoxBiasEstimate(rate, error_rates),
-            DetectionRateEstimate(rate, self.config, error_rates),
             PopulationEstimate(self.body, rate, error_rates),
             RimEstimate(number, self.body, self.config, rate, error_rates),
             ViewFailures(number, self.body, rate, error_rates),
@@ -110,17 +108,15 @@ class Detector:
         box_noise = noise or self.first_noise
         return [None if v is None else view.observe(v, box_noise) for view, v in zip(self.views, views, strict=True)]
 
-    def evidence(
-        self, observations: ViewObservations, prior: Prior, parameters: ScoreParameters | None = None
-    ) -> FrameEvidence:
-        """Evidence of a frame under a prior, and under parameters of the score, by default the configured ones."""
-        return FrameEvidence(self.views, observations, prior, parameters or self.parameters, self.pixel_lattice)
+    def evidence(self, observations: ViewObservations, prior: Prior) -> FrameEvidence:
+        """Evidence of a frame under a prior."""
+        return FrameEvidence(self.views, observations, prior, self.parameters, self.pixel_lattice)
 
     def explain(
         self, views: Sequence[ViewEvidence], predicted: PredictedTracks | None, proposals: Candidates | None = None
     ) -> Explanation:
         """Explain one frame as `explain_next`, by first guesses alone: of a session that has learned nothing."""
-        evidence = self._evidence(self.observe(views), self.new_estimates(), predicted)
+        evidence = self._evidence(self.observe(views), self.body, predicted)
         return explained_frame(self._search.whole(self._search.of_tracks(evidence), proposals))
 
     def explain_next(
@@ -156,7 +152,6 @@ class Detector:
         if self._has_boxes:
             learned.box_noise.learn(explanation, self.views, included)
             learned.box_bias.learn(explanation, self.views, included)
-            learned.detection_rates.learn(explanation, self.views, included)
         elif is_searched:
             learned.population.learn(explanation.people)
             learned.rims.learn(explanation.people, self.views, included)
@@ -176,7 +171,7 @@ class Detector:
         proposals: Candidates | None,
     ) -> tuple[Explanation, bool]:
         """A frame's explanation by what has been learned, and whether the whole ground was searched for it."""
-        evidence = self._evidence(learned.rims.applied(observations), learned, predicted)
+        evidence = self._evidence(learned.rims.applied(observations), learned.population.body, predicted)
         tracks = self._search.of_tracks(evidence)
         if not is_key and predicted is not None and proposals is None:
             explanation = followed_frame(tracks, self.lattice_ground)
@@ -184,7 +179,7 @@ class Detector:
                 return explanation, False
         estimate = self._search.whole(tracks, proposals)
         if is_key and predicted is not None and not self._has_boxes and has_weak_members(estimate):
-            untracked = self._evidence(evidence.observations, learned, None)
+            untracked = self._evidence(evidence.observations, evidence.prior.body, None)
             people = self._search.without_tracks(untracked)
             estimate = better_of(estimate, self._search.repeated(estimate, people))
             return _with_best_alternative(estimate, untracked, people), True
@@ -194,18 +189,15 @@ class Detector:
         self, explanation: Explanation, other: Explanation, learned: Estimates, observations: ViewObservations
     ) -> Explanation:
         """A frame's explanation with one by other tracks, and what its evidence says of both."""
-        untracked = self._evidence(learned.rims.applied(observations), learned, None)
+        untracked = self._evidence(learned.rims.applied(observations), learned.population.body, None)
         gain = likelihood_gain(untracked, explanation.people.candidates, other.people.candidates)
         return replace(explanation, alternative=other, alternative_gain=gain)
 
     def _evidence(
-        self, observations: ViewObservations, learned: Estimates, predicted: PredictedTracks | None
+        self, observations: ViewObservations, body: BodyConfig, predicted: PredictedTracks | None
     ) -> FrameEvidence:
-        """Evidence of a frame under the prior of its predicted tracks, and what has been learned."""
-        prior = Prior.of(predicted, self.config, learned.population.body, self.border)
-        return self.evidence(
-            observations, prior, self.parameters._replace(found_share=learned.detection_rates.found_share)
-        )
+        """Evidence of a frame under the prior of its predicted tracks and a population."""
+        return self.evidence(observations, Prior.of(predicted, self.config, body, self.border))
 
     def _learn_first_rims(self, learned: Estimates, observations: ViewObservations, searches: int) -> None:
         """Learn the rims of a young session before its frame is explained, as if births cost nothing.
@@ -222,7 +214,7 @@ class Detector:
 
     def _by_births(self, observations: ViewObservations, learned: Estimates) -> Explanation:
         """A frame's explanation without tracks."""
-        evidence = self._evidence(observations, learned, None)
+        evidence = self._evidence(observations, learned.population.body, None)
         return explained_frame(self._search.whole(self._search.of_tracks(evidence)))
 
     def _with_excluded_residuals(

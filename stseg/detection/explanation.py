@@ -82,7 +82,7 @@ def _visibility(estimate: MapEstimate) -> Floats:
         if isinstance(view, BoxView):
             k = next(boxes)
             visible = np.prod(_visible_past(evidence, k, members), axis=1)
-            row[:] = evidence.inside[k][members] * visible
+            row[:] = view.found_share(evidence.inside[k][members] * visible)
     return visibility
 
 

@@ -15,7 +15,6 @@ from stseg.arrays import Floats, Ints, Singles
 from stseg.bodies.outlines import Spans
 from stseg.config import DetectionConfig
 from stseg.kernels.accelerate import kernel, part
-from stseg.noise.detection_rate_estimate import first_found_share
 
 PixelAssignment = NDArray[np.int16]
 """int16 (view, v * u): the candidate that each raster pixel is assigned to, -1 for none. Small, for speed."""
@@ -62,15 +61,16 @@ class ScoreParameters(NamedTuple):
     common_width: float
     box_log_ratio: float
     box_miss_rate: float
+    hidden_visibility: float
+    full_visibility: float
+    hidden_detection_rate: float
     effective_observations: float
-    found_share: Floats
-    """float64 (knot,): rate of detections at `VISIBILITY_KNOTS`, relative to that of whole bodies."""
 
     @classmethod
     def of(cls, config: DetectionConfig, hard_core: float, common_width: float) -> ScoreParameters:
         """Those of a configuration; the hard core between bodies of common width, metres, depends on the views."""
-        same = {name: getattr(config, name) for name in cls._fields if hasattr(config, name)}
-        return cls(**same, hard_core=hard_core, common_width=common_width, found_share=first_found_share(config))
+        same = {name: getattr(config, name) for name in cls._fields if name not in ("hard_core", "common_width")}
+        return cls(**same, hard_core=hard_core, common_width=common_width)
 
 
 class BoxEvidence(NamedTuple):

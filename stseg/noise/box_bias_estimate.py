@@ -33,7 +33,7 @@ from stseg.records.people import Explanation
 
 _PRIOR_WEIGHT = 2.0
 """w_0, weight of no error, seconds of one box: the errors of one box last for a second, and are as large."""
-_FREE_VISIBILITY = 0.9
+_FREE_VISIBILITY = 0.95
 """Least share of a body that is visible where it stands free, 0..1."""
 _LARGEST_OFFSET = 0.15
 """Largest offset that is an error and not the box of another body: 2.5 standard deviations, shares of the height."""

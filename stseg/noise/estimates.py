@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
-from stseg.noise.detection_rate_estimate import DetectionRateEstimate
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate
 from stseg.view_health.view_failures import ViewFailures
@@ -17,8 +16,6 @@ class Estimates:
     box_noise: BoxNoiseEstimate
     box_bias: BoxBiasEstimate
     """Noise of detectors' boxes, and the mean error of their lower edges."""
-    detection_rates: DetectionRateEstimate
-    """Rates at which detectors find people who are hidden in part."""
     population: PopulationEstimate
     """Sizes of people."""
     rims: RimEstimate

@@ -27,7 +27,7 @@ from stseg.records.people import Explanation
 from stseg.records.sparse_volume import SparseVolume
 
 _MAP_STEP = 8
-_UNOCCLUDED = 0.9
+_UNOCCLUDED = 0.99
 """Least visible share of a body that counts as unoccluded."""
 
 

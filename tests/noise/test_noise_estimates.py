@@ -25,7 +25,6 @@ from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
-from stseg.noise.detection_rate_estimate import VISIBILITY_KNOTS, DetectionRateEstimate, first_found_share
 from stseg.noise.population_estimate import PopulationEstimate
 from stseg.noise.rim_estimate import RimEstimate, without_rim
 from stseg.noise.torn_masks import is_unexplained, mask_log_likelihood, with_rates
@@ -114,22 +113,6 @@ def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
     ends = [boxes for boxes in estimate.corrected(delivered, sizes) if isinstance(boxes, Boxes)]
     feet = [boxes.pixel[:, 1] + boxes.pixel[:, 3] for boxes in ends]
     assert max(np.abs(foot - body[:, 3]).max() for foot, body in zip(feet, bodies, strict=True)) < 2.0
-
-
-@pytest.mark.parametrize("finds_hidden", [False, True])
-def test_rates_of_hidden_people_are_learned(finds_hidden: bool) -> None:
-    frame_pass, estimate = detector_of(room(), "boxes"), DetectionRateEstimate(RATE, DetectionConfig(), CONFIG)
-    np.testing.assert_allclose(estimate.found_share, first_found_share(DetectionConfig()))
-    whole = shaken_boxes(frame_pass, people((-0.5, -0.5), (0.1, -0.1)), 0.01, 1.0, np.random.default_rng(1))
-    explanation = frame_pass.explain(whole, None)
-    visibility = explanation.people.visibility
-    assert sorted(visibility.ravel())[1] == pytest.approx(0.5, abs=0.1)
-    pairs = zip(whole, visibility, explanation.box_assignment, strict=True)
-    boxes = whole if finds_hidden else [one.of(visible[owner] > 0.6) for one, visible, owner in pairs]
-    for _ in range(60):
-        estimate.learn(frame_pass.explain(boxes, None), frame_pass.views, frame_pass.observe(boxes))
-    learned = np.interp(0.5, VISIBILITY_KNOTS, estimate.found_share)
-    assert learned > 0.9 if finds_hidden else learned < 0.2
 
 
 def test_knots_alone_learn_anew_in_each_session_not_the_width() -> None:

@@ -70,11 +70,8 @@ def body_distance(i: int, j: int, ground: Floats, breadth: Floats) -> float:
 
 @part
 def missing_box_cost(visible: float, parameters: ScoreParameters) -> float:
-    """Cost of a missing box of a body of which such a share is visible, nats; none outside the image."""
-    if not visible > 0:
-        return 0.0
-    found = parameters.found_share
-    at = min(visible, 1.0) * (len(found) - 1)
-    lower = min(int(at), len(found) - 2)
-    share = found[lower] + (at - lower) * (found[lower + 1] - found[lower])
-    return float(np.log(1.0 - (1.0 - parameters.box_miss_rate) * share))
+    """Cost of a missing box of a body of which such a share is visible, nats."""
+    share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
+    return float(
+        np.log(1.0 - (1.0 - parameters.box_miss_rate) * min(max(share, parameters.hidden_detection_rate), 1.0))
+    )
