@@ -44,11 +44,15 @@ def frozen(value: Any) -> Any:
 
 
 def cases(*more: object) -> Callable[[Test], Test]:
-    """A test of each row of the table of its name, whose first row names the columns, and of rows that code makes."""
+    """A test of each row of the table of its name, of rows that code makes, and in CI of the table NAME_in_ci.
+
+    The first row of a table names the columns.
+    """
 
     def parametrised(test: Test) -> Test:
-        columns, *rows = tables(Path(test.__code__.co_filename).with_suffix(".toml"))[test.__name__[5:]]
-        return cast(Test, pytest.mark.parametrize(columns, [*rows, *more])(test))
+        name, given = test.__name__[5:], tables(Path(test.__code__.co_filename).with_suffix(".toml"))
+        (columns, *rows), late = given[name], in_ci(*map(tuple, given.get(f"{name}_in_ci", ())))
+        return cast(Test, pytest.mark.parametrize(columns, [*rows, *more, *late])(test))
 
     return parametrised
 

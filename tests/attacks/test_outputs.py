@@ -19,7 +19,8 @@ from stseg.io.exports.formats import FORMATS
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.runfile.reading.run_reader import Run
 
-COMMANDS = tables(Path(__file__).with_suffix(".toml"))["commands"]
+TABLES = tables(Path(__file__).with_suffix(".toml"))
+COMMANDS = TABLES["commands"]
 """Commands without their output, and their inputs."""
 
 
@@ -81,12 +82,7 @@ def test_pictures_and_tables_replace_nothing_foreign(folder: Path, refusal: Comm
     Path("zones.csv").write_text("zone,mine\n")
     Path("plan.png").write_bytes(b"precious")
     before = contents(folder)
-    for command in (
-        "inspect rig.toml -o .",
-        "measure run.h5 -o .",
-        "report run.h5 -o page.html --pictures .",
-        "calibrate check rig.toml --frames 0:2 --pictures west.png",
-    ):
+    for command in TABLES["pictures_and_tables"]:
         refusal(*command.split(), "--overwrite")
     Path("small.toml").write_text(format_rig(small_recording(folder), folder / "small.toml"))
     assert ".: found files in it" in refusal(*["run", "small.toml", "-o", "new.h5", "--labels", "."])

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from browser import CHROMIUM, Page, chromium
-from checks import Captured, data_path, in_ci, refused
+from checks import Captured, cases, data_path, in_ci, refused
 from simulated_people import SIZE, exchanged, moved, ring, shown, walkers
 
 from stseg import Boxes, Camera, Recording, Rig, Source, read_recording, write_rig
@@ -85,9 +85,7 @@ class TestVerdict:
         assert view.right < -0.2, "the rig says further right, so people show to the left"
         assert "to the left" in words and " px" in words
 
-    @pytest.mark.parametrize(
-        ("view", "kind", "amount"), [(1, "z", 0.25), *in_ci((0, "x", 0.4), (1, "y", -0.4), (0, "yaw", 14.0))]
-    )
+    @cases()
     def test_the_camera_that_is_off_is_named(self, view: int, kind: str, amount: float) -> None:
         check, words = judged(moved(RIG, view, kind, amount))
         assert [one.view for one in check.verdict.named] == [view]

@@ -20,7 +20,6 @@ from run_files import small_recording, small_trajectory, trajectory_of, write_em
 
 import stseg
 from stseg import Grid, Lens, Rig, read_run, read_tracks_csv
-from stseg.arrays import Floats
 from stseg.commands.inspect import event_counts_text
 from stseg.commands.main import COMMANDS, main
 from stseg.errors import CalibrationError, OutputError
@@ -261,16 +260,10 @@ def test_pages_and_their_commands_hold_names_as_text(folder: Path) -> None:
     refused(OutputError, "a file that is read", found.write_page, Path("boxes.csv"), overwrite=True)
 
 
-@pytest.mark.parametrize(
-    ("ground", "vertical", "message"),
-    [
-        (np.zeros((1, 3, 3)), np.zeros((2, 3)), r"found arrays of \(1, 3, 3\) and \(2, 3\) for 2 cameras"),
-        (np.zeros((2, 3, 3)), np.zeros((2, 4)), r"found arrays of \(2, 3, 3\) and \(2, 4\) for 2 cameras"),
-    ],
-)
-def test_arrays_of_rigs_are_refused(ground: Floats, vertical: Floats, message: str) -> None:
-    sizes, grid = [(64, 48)] * 2, Grid((0, 1), (0, 1))
-    refused(CalibrationError, message, Rig.from_homographies, ground, vertical, sizes, grid, 5.0)
+@cases()
+def test_arrays_of_rigs_are_refused(ground: list[int], vertical: list[int], message: str) -> None:
+    sizes, grid, arrays = [(64, 48)] * 2, Grid((0, 1), (0, 1)), (np.zeros(ground), np.zeros(vertical))
+    refused(CalibrationError, message, Rig.from_homographies, *arrays, sizes, grid, 5.0)
 
 
 @cases()

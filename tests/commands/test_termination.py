@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from checks import in_ci
+from checks import cases
 
 from stseg.kernels.accelerate import COMPILED
 
@@ -132,27 +132,15 @@ def ended_by(running: subprocess.Popen[str], number: signal.Signals) -> tuple[in
     return status, running.stderr.read().strip()
 
 
-TERMINATED, INTERRUPTED = (signal.SIGTERM, 143, "stseg: terminated"), (signal.SIGINT, 130, "stseg: interrupted")
 compiled = pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
 
 
-@pytest.mark.parametrize(
-    ("what", "sent"),
-    [
-        pytest.param("in_a_kernel", INTERRUPTED, marks=compiled),
-        pytest.param("compiling", TERMINATED, marks=compiled),
-        ("calling_back", TERMINATED),
-        ("leaving_a_thread", INTERRUPTED),
-        ("refusing_to_end", INTERRUPTED),
-        pytest.param("in_a_kernel", TERMINATED, marks=[compiled, pytest.mark.slow]),
-        pytest.param("writing_a_run", INTERRUPTED, marks=[compiled, pytest.mark.slow]),
-        *in_ci(*((what, TERMINATED) for what in ("going_on_after_a_callback", "failing_of_it", "ending_slowly"))),
-    ],
-)
-def test_a_signal_ends_a_command_in_time(what: str, sent: tuple[signal.Signals, int, str], tmp_path: Path) -> None:
-    number, status, line = sent
+@cases()
+def test_a_signal_ends_a_command_in_time(what: str, sent: str, status: int, line: str, tmp_path: Path) -> None:
+    if not COMPILED and what in ("in_a_kernel", "compiling", "writing_a_run"):
+        pytest.skip("nothing is compiled")
     with command(tmp_path, what) as running:
-        assert ended_by(running, number) == (status, line)
+        assert ended_by(running, signal.Signals[sent]) == (status, line)
 
 
 @compiled

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
-from checks import refused
+from checks import cases, refused
 from scenes import boxes, corner_cameras, found, mask, people, rig_of
 
 from stseg.arrays import Boxes, Floats, Observation, Rows, ViewEvidence
@@ -145,18 +144,12 @@ def test_rows_of_features_are_those_of_the_rig_files_boxes(tmp_path: Path) -> No
     assert named == [tmp_path / "looks.npy"] * 4
 
 
-@pytest.mark.parametrize(
-    ("features", "reported"),
-    [
-        (np.zeros((3, 2)), "3 rows"),
-        (np.zeros(4), "an array of float64 (4,)"),
-        (np.zeros((4, 0)), "an array of float64 (4, 0)"),
-        (np.full((4, 2), np.nan), "a number that is not finite"),
-        (np.full((4, 2), "x"), "an array of"),
-    ],
-)
-def test_files_that_are_no_features_are_refused(tmp_path: Path, features: Floats, reported: str) -> None:
-    said = refused(FormatError, r"looks\.npy", open_stream, source(tmp_path, features), CAMERAS[0])
+@cases()
+def test_files_that_are_no_features_are_refused(
+    tmp_path: Path, shape: list[int], value: float | str, reported: str
+) -> None:
+    wanted = source(tmp_path, np.full(shape, value))
+    said = refused(FormatError, r"looks\.npy", open_stream, wanted, CAMERAS[0])
     assert reported in said and "\n" not in said
 
 

@@ -14,7 +14,7 @@ import h5py
 import numba
 import numpy as np
 import pytest
-from checks import Command, compiled_only, refused
+from checks import Command, cases, compiled_only, refused
 from recordings import FRAMES, OPTIONS, assert_same, track
 from run_files import write_small_run
 from scenes import box_frame_sets, corner_cameras, rig_of, walkers
@@ -141,21 +141,15 @@ def test_numbers_that_are_none_of_a_frame_are_refused(frame: Any) -> None:
     refused(stseg.InputError, "found the number", stseg.Tracker(RIG).add, [np.zeros((0, 4))] * 4, frame=frame)
 
 
-@pytest.mark.parametrize(
-    ("views", "complaint"),
-    [
-        ([None] * 3, "3 observations, expected 4"),
-        ({"nowhere": None}, "nowhere"),
-        ([np.zeros((7, 9), np.uint8), None, None, None], "uint8"),
-        ([np.full((2, 5), np.nan), None, None, None], "not finite"),
-        ([np.array([[0, 0, 4, -1.0]]), None, None, None], "a size of -1"),
-        ([np.array([[0, 0, 4, 9, 1.5]]), None, None, None], "a score of 1.5"),
-        ([np.full(RIG.cameras[0].size[::-1], 2.0), None, None, None], "outside 0..1"),
-        ([np.zeros((*RIG.cameras[0].size[::-1], 3), np.uint8), None, None, None], "empty="),
-    ],
-)
-def test_an_observation_that_does_not_suit_is_one_line(views: Any, complaint: str) -> None:
-    refused(stseg.InputError, complaint, stseg.Tracker(RIG).add, views)
+@cases()
+def test_an_observation_that_does_not_suit_is_one_line(shape: list[int], value: Any, kind: str, complaint: str) -> None:
+    view = np.broadcast_to(np.array(value, kind), shape)
+    refused(stseg.InputError, complaint, stseg.Tracker(RIG).add, [view, None, None, None])
+
+
+def test_observations_of_other_views_are_refused() -> None:
+    refused(stseg.InputError, "3 observations, expected 4", stseg.Tracker(RIG).add, [None] * 3)
+    refused(stseg.InputError, "nowhere", stseg.Tracker(RIG).add, {"nowhere": None})
 
 
 def test_rigs_from_arrays() -> None:

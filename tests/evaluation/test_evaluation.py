@@ -13,7 +13,7 @@ from typing import Any, Literal, cast
 import numpy as np
 import pytest
 import reference_evaluation as reference
-from checks import Captured, data_path, drawn, refused
+from checks import Captured, cases, data_path, drawn, refused
 from cyclopts import App
 from hypothesis import strategies as st
 from run_files import table_of
@@ -83,33 +83,19 @@ def test_perfect_tracks_score_full_marks_whatever_their_names() -> None:
 GAP = TWO[(TWO["id"] == 2) | ~np.isin(TWO["frame"], [4, 5])]
 """The first is missed in two frames."""
 HALVES = table(walk(1, 0.0, range(5)) + walk(1, 5.0, range(5, 10)) + walk(2, 2.0, TEN))
-SCENES: dict[str, tuple[Rows, dict[str, float]]] = {
-    "silent half the time": (
-        TWO[TWO["frame"] < 5],
-        {"frames": 10, "moda": 50, "recall": 50, "mota": 50, "precision": 100, "modp": 100, "idf1": 200 / 3,
-         "mostly_tracked": 0},
-    ),
-    "swapped names": (  # every pair shares 5 of 15 frames
-        with_ids(TWO, TWO["frame"] >= 5, 3 - TWO["id"]),
-        {"moda": 100, "switches": 2, "fragments": 0, "mota": 90, "idf1": 50, "hota": 100 * np.sqrt(1 / 3)},
-    ),
-    "a gap under one name": (GAP, {"fragments": 1, "switches": 0, "misses": 2, "mostly_tracked": 1}),
-    "a new name after a gap": (
-        with_ids(GAP, (GAP["id"] == 1) & (GAP["frame"] > 5), 8), {"fragments": 1, "switches": 1},
-    ),
-    "a false track": (
-        np.concatenate([TWO, table(walk(9, 5.0, range(4)))]),
-        {"false_alarms": 4, "false_tracks": 1, "false_track_frames": 4, "moda": 80, "recall": 100,
-         "precision": 100 * 20 / 24},
-    ),
-    "matched in just half of its frames": (HALVES, {"false_tracks": 1}),
-}  # fmt: skip
+SCENES = {
+    "silent half the time": TWO[TWO["frame"] < 5],
+    "swapped names": with_ids(TWO, TWO["frame"] >= 5, 3 - TWO["id"]),
+    "a gap under one name": GAP,
+    "a new name after a gap": with_ids(GAP, (GAP["id"] == 1) & (GAP["frame"] > 5), 8),
+    "a false track": np.concatenate([TWO, table(walk(9, 5.0, range(4)))]),
+    "matched in just half of its frames": HALVES,
+}
 
 
-@pytest.mark.parametrize("scene", SCENES)
-def test_scores_of_named_scenes(scene: str) -> None:
-    tracks, expected = SCENES[scene]
-    scores = evaluate(TWO, tracks)
+@cases()
+def test_scores_of_named_scenes(scene: str, expected: dict[str, float]) -> None:
+    scores = evaluate(TWO, SCENES[scene])
     assert {name: getattr(scores, name) for name in expected} == pytest.approx(expected)
 
 
@@ -310,9 +296,7 @@ def test_a_run_file_is_read_as_a_run(
     assert json.loads(capsys.readouterr().out)["MODA"] == 100
 
 
-@pytest.mark.parametrize(
-    ("align", "scale", "mean"), [("rigid", 1.0, 0.0), ("similarity", 1.2, 0.0), ("rigid", 1.2, 0.05)]
-)
+@cases()
 def test_tracks_elsewhere_are_laid_on_truth(align: Literal["rigid", "similarity"], scale: float, mean: float) -> None:
     """Turned, shifted and scaled tracks score as they did; a scale is mended by a similarity alone."""
     angle = np.linspace(0, 5, 60)

@@ -95,13 +95,11 @@ def test_images_are_blue_green_red(tmp_path: Path, channels: int) -> None:
     assert read.shape == (2, 3, 3) and read[1, 2].tolist() == expected
 
 
-@pytest.mark.parametrize(("kind", "picture", "reported"), [
-    ("masks", np.zeros((2, 3), np.uint16), "found values of type uint16, expected 8 bits"),
-    ("instances", np.zeros((2, 3, 3), np.uint8), "found a picture in colours"),
-    ("images", np.zeros((2, 4), np.uint8), "found an image of 4x2, expected 3x2"),
-])  # fmt: skip
-def test_pictures_of_another_kind_are_refused(tmp_path: Path, kind: SourceKind, picture: Bytes, reported: str) -> None:
-    cv2.imwrite(str(tmp_path / "a.png"), picture)
+@cases()
+def test_pictures_of_another_kind_are_refused(
+    tmp_path: Path, kind: SourceKind, shape: list[int], values: str, reported: str
+) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros(shape, values))
     refused(SourceError, f"a.png: camera a: {reported}", read_picture, tmp_path / "a.png", kind, (3, 2), "camera a")
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from checks import in_ci, refused
+from checks import cases, refused
 from numba.core.caching import NullCache
 from recordings import process, started
 
@@ -129,13 +129,7 @@ def damaged(file: Path, kind: str) -> None:
 
 @COMPILED
 @pytest.mark.skipif(sys.platform == "win32", reason="no owners and modes of files")
-@pytest.mark.parametrize(
-    ("kind", "files"),
-    [
-        ("forged", "nbi"),
-        *in_ci(("empty", "nbi"), ("empty", "nbc"), ("flipped", "nbc"), ("writable", "nbi"), ("owned", "nbc")),
-    ],
-)
+@cases()
 def test_foreign_cached_files_are_unused(cached: tuple[Path, list[str]], tmp_path: Path, kind: str, files: str) -> None:
     if kind == "owned" and os.geteuid():
         pytest.skip("only root gives files away")

@@ -14,10 +14,7 @@ ROOT = Path(__file__).parents[2]
 
 RULES = tables(Path(__file__).with_suffix(".toml"))
 FOUNDATION, NEEDED, AT_HOME = RULES["foundation"], RULES["needed"], RULES["at_home"]
-STAGES: dict[str, set[str]] = {stage: set(parts) for stage, parts in RULES["stages"].items()}
-BESIDE: dict[str, set[str]] = {room: set(parts) for room, parts in RULES["beside"].items()}
-SOLVER = "graphcut"
-"""Minimum cuts and expansion moves: they know nothing of people, and could be a package of their own."""
+STAGES, BESIDE, OTHERS = RULES["stages"], RULES["beside"], RULES["others"]
 
 
 @dataclass(frozen=True)
@@ -59,25 +56,16 @@ def modules() -> list[Module]:
 
 def parts_imported(module: Module) -> set[str]:
     """Parts of the package that a module imports, its own left out."""
-    parts = {*FOUNDATION, SOLVER, *STAGES, *BESIDE, "engine", "tasks", "commands"}
     taken = {name.split(".")[1] for name in module.imports if name.startswith("stseg.")}
-    assert taken <= parts, f"{module.name} imports {taken - parts}, of which no rule is known"
+    assert taken <= {*ALLOWED}, f"{module.name} imports {taken - {*ALLOWED}}, of which no rule is known"
     return taken - {module.part}
 
 
+GROUPS = {"foundation": {*FOUNDATION}, "stages": {*STAGES}, "beside": {*BESIDE} - {"baselines"}}
 ALLOWED = {
-    # the public names, for type checkers; at run time each is imported when it is asked for
-    "__init__": {*FOUNDATION, *STAGES, *BESIDE, "engine", "tasks"},
-    "__main__": {"commands"},
     **{part: set(FOUNDATION[:k]) for k, part in enumerate(FOUNDATION)},
-    SOLVER: {"errors", "arrays", "kernels"},
     **{stage: {*FOUNDATION, *parts} for stage, parts in STAGES.items()},
-    **BESIDE,
-    "trackers": {*FOUNDATION, *BESIDE["trackers"]},
-    "baselines": {*FOUNDATION, *BESIDE["baselines"]},
-    "engine": {*FOUNDATION, *STAGES, "trackers", "io"},
-    "tasks": {*FOUNDATION, *STAGES, *BESIDE, "engine"} - {"baselines"},
-    "commands": {*FOUNDATION, *STAGES, *BESIDE, "engine", "tasks"} - {"baselines"},
+    **{part: set().union(*(GROUPS.get(one, {one}) for one in parts)) for part, parts in (BESIDE | OTHERS).items()},
 }
 """What the modules of a part may import."""
 

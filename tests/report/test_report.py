@@ -199,17 +199,10 @@ def test_ghosts_have_the_reason_that_weighed_most() -> None:
     assert (none.counts(), none.denies.shape) == ([0, 0, 0], (0, 3))
 
 
-@pytest.mark.parametrize(
-    ("nats", "words"),
-    [
-        (np.zeros(300), "view b has no evidence on any candidate"),
-        (np.where(FRAMES < 250, 3.0, 0.0), "view b has no evidence in frames 250 to 399 (30 s)"),
-        (np.full(300, -2.0), "view b denies most people"),
-        (np.linspace(4, 0.5, 300), "view b drifts: its evidence for a person falls from 3.4 to 1.1 nats"),
-    ],
-)
-def test_a_view_that_is_wrong_is_named(nats: AnyArray, words: str) -> None:
-    (warning,) = view_warnings(("a", "b"), people_in(FRAMES, 3.0, nats), FRAMES, 5.0)
+@cases()
+def test_a_view_that_is_wrong_is_named(frames: list[int], nats: list[float], words: str) -> None:
+    seen = people_in(FRAMES, 3.0, np.interp(FRAMES, frames, nats))
+    (warning,) = view_warnings(("a", "b"), seen, FRAMES, 5.0)
     assert words in warning
 
 

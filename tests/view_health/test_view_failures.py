@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from checks import drawn, examples, in_ci
+from checks import cases, drawn, examples, in_ci
 from hypothesis import strategies as st
 from scenes import BODY, detector_of, evidence_of, expecting, likelihoods, looking, no_boxes, people, rig_of, room
 
@@ -62,14 +62,7 @@ def failed(kind: str, failure: str, seen: Sequence[ViewEvidence]) -> list[ViewEv
     return [bad if k == FAILED else own for k, own in enumerate(seen)]
 
 
-@pytest.mark.parametrize(
-    ("kind", "failure", "frames"),
-    [
-        ("pixels", "black", 5),
-        ("boxes", "black", 5),
-        *in_ci(("pixels", "white", 5), ("pixels", "noise", 5), ("pixels", "black", 40)),
-    ],
-)
+@cases()
 def test_a_view_that_fails_is_left_out_and_counts_again(kind: str, failure: str, frames: int) -> None:
     """After a short failure the same people come back, after a long one the scene is empty."""
     (asked, learned), seen = session(kind), shown(kind)

@@ -10,7 +10,7 @@ import detector_models
 import numpy as np
 import onnx
 import pytest
-from checks import cases, data_path, refused
+from checks import cases, data_path, refused, tables
 from detector_models import HEIGHT, MODELS, WIDTH
 
 from stseg.errors import FormatError, InputError, SourceError
@@ -172,22 +172,12 @@ def test_a_cut_model_is_refused_in_one_line(by_opencv: bool, tmp_path: Path) -> 
         assert "\n" not in refused(InputError, r"cut\.onnx", OnnxDetector, tmp_path / "cut.onnx", by_opencv=by_opencv)
 
 
-OPENCV_4 = [
-    [-3.3908, -3.2118, -3.6878, -3.6908, -3.4729, -3.5806],
-    [-4.1516, -3.7093, -3.9087, -3.8200, -3.7309, -3.2153],
-    [-3.8050, -3.3361, -3.5649, -3.2525, -3.6762, -3.8543],
-    [-4.6520, -3.8127, -3.8982, -4.0287, -4.5966, -4.9619],
-    [-4.0960, -3.6276, -4.2863, -4.2109, -4.7578, -5.3679],
-    [-3.8104, -3.4192, -3.6644, -3.4096, -4.1090, -4.6598],
-]
-"""`HOGDescriptor.detect` of OpenCV 4.14 with winStride (8, 8) and padding (16, 16), of the picture below."""
-
-
 def test_whole_people_are_found_with_margins_of_opencv_4() -> None:
     v, u = np.indices((136, 72))
     channels = (u * u + 3 * v) % 256, (v * v // 7 + u) % 256, ((u - 30) ** 2 + (v - 60) ** 2) // 9 % 256
     margins = window_margins(np.stack(channels, axis=-1).astype(np.uint8))
-    assert margins.ravel().tolist() == pytest.approx(np.ravel(OPENCV_4).tolist(), abs=1e-4)
+    of_opencv = tables(Path(__file__).with_suffix(".toml"))["margins_of_opencv_4"]
+    assert margins.ravel().tolist() == pytest.approx(np.ravel(of_opencv).tolist(), abs=1e-4)
     video = cv2.VideoCapture(str(data_path("uu4_colour/cam1.avi")))
     for _ in range(21):
         _, picture = video.read()
