@@ -13,7 +13,7 @@ from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
-from stseg.records.tables import ERROR_RATES
+from stseg.records.tables import ERROR_RATES, event_word
 from stseg.tasks.overview import Overview, summarise_run
 from stseg.tasks.slices import write_slice
 from stseg.tasks.sources import COLUMNS, recording_warnings, summarise_sources, write_source_pictures
@@ -141,8 +141,8 @@ def _minutes(people: list[float]) -> str:
 
 
 def event_counts_text(counts: dict[str, int]) -> str:
-    """Counts of events by kind; a split is the end of a merge."""
-    return ", ".join(f"{count} {kind}" for kind, count in counts.items() if kind != "split")
+    """Counts of events by kind; a split is the end of an encounter."""
+    return ", ".join(f"{count} {event_word(kind)}" for kind, count in counts.items() if kind != "split")
 
 
 def _views(overview: Overview) -> Table:

@@ -51,6 +51,12 @@ BOX = columns("frame:<i8 id:<i8 view:<i4 left:<f4 top:<f4 width:<f4 height:<f4")
 EVENT = columns("frame:<i8 kind:S12 id:<i8 other:<i8 reason:S96")
 """birth, death, merge, split, hand-over, doubt, return, dropped, blind, crowd; `other` is another track, 0 for none."""
 
+
+def event_word(kind: str) -> str:
+    """Word that people read for a kind of event: a merge, which begins an encounter, stands for all of it."""
+    return "encounter" if kind == "merge" else kind
+
+
 CORRECTION = columns("decision_frame:<i8 first:<i8 last:<i8 id:<i8 corrected_id:<i8")
 """Rows of a live id in frames `first` to `last`, both included, that are of another id.
 

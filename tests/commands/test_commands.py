@@ -107,7 +107,7 @@ def test_inspect_as_json_and_on_a_screen_warns_of_empty_runs(run_path: Path, std
     _, _, listed = page.partition("## Keys of `stseg inspect --json`")
     cells = re.findall(r"^\| (`.*?`) \|", listed, re.MULTILINE)
     assert re.findall(r"`(\w+)`", " ".join(cells)) == list(found)
-    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 merge"
+    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
     screen = stdout("inspect", run_path)
     for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
         assert said in screen
@@ -254,6 +254,7 @@ def test_pages_and_their_commands_hold_names_as_text(folder: Path) -> None:
     with (folder / "rig.toml").open("a") as rig:
         rig.write(RIG[RIG.index("[[camera]]") :].replace("cam1", "<i>"))
     found = stseg.check_rig("rig.toml")
+    assert found.frame == 2 and [len(view.pixel) for view in found.views if isinstance(view, stseg.Boxes)] == [0, 0]
     found.write_page(Path("check.html"))
     text = (folder / "check.html").read_text()
     assert "&lt;b&gt;" in text and "&lt;i&gt;" in text and "<b>" not in text and "<i>" not in text

@@ -91,7 +91,7 @@ def test_tables_as_data_frames_where_pandas_is(run_path: Path, monkeypatch: pyte
     assert list(table.columns) == [*(run.trajectory.dtype.names or ()), "time"]
     np.testing.assert_array_equal(table["x"], run.trajectory["x"])
     np.testing.assert_allclose(table.groupby("id")["time"].max(), [3.0, 3.0])
-    assert run.data_frame("events")["reason"].tolist() == ["start", "entered"]
+    assert run.data_frame("events")[["kind", "reason"]].to_numpy().T.tolist() == [["birth"] * 2, ["start", "entered"]]
     ghosts = run.data_frame("ghosts")
     np.testing.assert_array_equal(ghosts["parts_left"], small_ghosts()["parts"][:, 0])
     assert "parts_right" in ghosts

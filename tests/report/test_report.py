@@ -78,8 +78,8 @@ def test_an_encounter_is_one_line_and_says_how_long_it_was(tmp_path: Path) -> No
         writer.append("events", np.array(events, EVENT))
         writer.finish(Tracks(run_files.small_trajectory()).summary())
     page = page_of(path, tmp_path / "met.html", frame=(11,))
-    assert "merge <b>1</b>" in page and "their cells touch, for 0.4 s" in page
-    assert "split" not in page.split("<h2>Events</h2>")[1].split("</section>")[0]
+    assert "encounter <b>1</b>" in page and "<td>encounter<" in page and "their cells touch, for 0.4 s" in page
+    assert not {"split", "merge"} & set(re.findall(r"\w+", page.split("<h2>Events</h2>")[1].split("</section>")[0]))
     assert "which this run did not keep (--volume tracks)" in page
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.records.ghost_reasons import REASONS, GhostReasons
+from stseg.records.tables import event_word
 from stseg.reporting.charts import people_chart, track_chart
 from stseg.reporting.figures import Figure
 from stseg.reporting.page.html import MOST_ROWS, bars, chart, figure, figures, note, page, section, swatch, table, when
@@ -263,14 +264,15 @@ def _cells(cell_probability: Sequence[tuple[float, float]]) -> str:
 
 
 def _event_summary(contents: Contents) -> str:
-    """Counts of events by kind; a split is the end of a merge."""
+    """Counts of events by kind; a split is the end of an encounter."""
     kinds, counts = np.unique(_without_splits(contents.events)["kind"], return_counts=True)
-    words = [f"{escape(kind.decode())} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
+    named = zip((escape(event_word(kind.decode())) for kind in kinds), counts.tolist(), strict=True)
+    words = [f"{kind} <b>{count}</b>" for kind, count in named]
     return note(" &middot; ".join(words) or "none")
 
 
 def _without_splits(events: Rows) -> Rows:
-    """Events without splits: a merge's row holds its duration."""
+    """Events without splits: an encounter's row holds its duration."""
     return np.asarray(events[events["kind"] != b"split"])
 
 
@@ -281,7 +283,7 @@ def _event_table(span: Span, events: Rows) -> str:
     rows = [
         (
             when(span, int(row["frame"])),
-            escape(row["kind"].decode()),
+            escape(event_word(row["kind"].decode())),
             swatch(int(row["id"])),
             swatch(int(row["other"])) if row["other"] else "",
             escape(row["reason"].decode(errors="replace")),

@@ -1,7 +1,7 @@
 """`stseg.check_rig`: a rig against its recording, by the people in it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -52,15 +52,14 @@ class RigCheck:
         Disagreements, swapped and delayed streams.
     verdict
         The same in sentences.
-    frame, views
-        The middle frame, and each camera's observation of it.
+    frame
+        The middle frame of those that were looked at.
     """
 
     recording: Recording
     check: Check
     verdict: tuple[str, ...]
     frame: int
-    views: tuple[Observation, ...]
 
     def __repr__(self) -> str:
         return f"RigCheck({self.recording.rig.name}: {' '.join(self.verdict)})"
@@ -92,6 +91,12 @@ class RigCheck:
             "people": check.people,
             "views": dict(zip(names, views, strict=True)),
         }
+
+    @cached_property
+    def views(self) -> tuple[Observation, ...]:
+        """Each camera's observation of the middle frame, read on its first use."""
+        with open_frames(self.recording.without_images(), self.frame, self.frame + 1) as frame_sets:
+            return next(frame_sets).views
 
     @cached_property
     def pictures(self) -> list[Figure]:
@@ -136,10 +141,25 @@ def check_rig(rig: Path | str | Recording, *, frames: FrameSpan = None, progress
         Where the recording cannot be read, or has no such frames.
     """
     recording, (first, stop) = recording_of(rig), _frame_range(frames)
+    boxes = _isolated_boxes(recording, first, stop, progress)
+    if not boxes:
+        raise ConfigError("--frames", "", f"{first}:{stop}", "a part of the recording")
+    if len(recording.rig.cameras) < 2:
+        raise CalibrationError(recording.path, "camera", "one camera", "two or more, each to be checked by the others")
+    check = check_boxes(recording.rig, boxes)
+    if not (check.sound or check.swapped) and any(feed.background for feed in recording.sources):
+        # Empty scenes that were not swapped with their streams spoil the foreground: the streams alone are looked at.
+        bare = replace(recording, sources=tuple(replace(feed, background=None) for feed in recording.sources))
+        again = check_boxes(recording.rig, _isolated_boxes(bare, first, stop, progress))
+        check = again if again.swapped else check
+    return RigCheck(recording, check, tuple(verdict_text(recording.rig, check)), first + len(boxes) // 2)
+
+
+def _isolated_boxes(recording: Recording, first: int, stop: int, progress: AnyReporter) -> dict[int, list[Floats]]:
+    """Boxes (n, 4) of people who stand alone in each view, by frame."""
     foregrounds = make_foregrounds(recording, Config(), first, stop)
     sizes = [camera.size for camera in recording.rig.cameras]
     boxes: dict[int, list[Floats]] = {}
-    middle: tuple[int, tuple[Observation, ...]] = (first, (None,) * len(foregrounds))
     with (
         open_frames(recording.without_images(), first, None) as frame_sets,
         reporter_of(progress).progress("looking", stop - first) as advance,
@@ -149,15 +169,8 @@ def check_rig(rig: Path | str | Recording, *, frames: FrameSpan = None, progress
                 foreground.evidence(view) for foreground, view in zip(foregrounds, frame_set.views, strict=True)
             ]
             boxes[frame_set.frame] = [isolated_boxes(one, size) for one, size in zip(evidence, sizes, strict=True)]
-            if frame_set.frame <= first + (stop - first) // 2:
-                middle = (frame_set.frame, frame_set.views)
             advance(1)
-    if not boxes:
-        raise ConfigError("--frames", "", f"{first}:{stop}", "a part of the recording")
-    if len(sizes) < 2:
-        raise CalibrationError(recording.path, "camera", "one camera", "two or more, each to be checked by the others")
-    check = check_boxes(recording.rig, boxes)
-    return RigCheck(recording, check, tuple(verdict_text(recording.rig, check)), *middle)
+    return boxes
 
 
 def _frame_range(frames: FrameSpan) -> tuple[int, int]:
