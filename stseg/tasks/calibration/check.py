@@ -147,7 +147,8 @@ def check_rig(rig: Path | str | Recording, *, frames: FrameSpan = None, progress
     if len(recording.rig.cameras) < 2:
         raise CalibrationError(recording.path, "camera", "one camera", "two or more, each to be checked by the others")
     check = check_boxes(recording.rig, boxes)
-    if not (check.sound or check.swapped) and any(feed.background for feed in recording.sources):
+    judged = check.swapped or (check.sound and None not in check.verdict.views)
+    if not judged and any(feed.background for feed in recording.sources):
         # Empty scenes that were not swapped with their streams spoil the foreground: the streams alone are looked at.
         bare = replace(recording, sources=tuple(replace(feed, background=None) for feed in recording.sources))
         again = check_boxes(recording.rig, _isolated_boxes(bare, first, stop, progress))
