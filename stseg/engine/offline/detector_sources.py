@@ -54,20 +54,22 @@ def with_boxes(recording: Recording, folder: Path, reporter: Reporter, overwrite
             found = error.strerror or error
             raise SourceError(model, f"camera {name}, {key}", found, "a model in ONNX") from error
     if any(not one.state.whole for one in (*boxes.values(), *features.values())):
-        _make(recording, boxes, features, folder, reporter)
+        _make_missing(recording, boxes, features, folder, reporter)
     feeds = list(recording.sources)
     for k, one in boxes.items():
         feeds[k] = _with_boxes(feeds[k], one, features.get(k))
     return replace(recording, sources=tuple(feeds))
 
 
-def _make(recording: Recording, boxes: Files, features: Files, folder: Path, reporter: Reporter) -> None:
+def _make_missing(recording: Recording, boxes: Files, features: Files, folder: Path, reporter: Reporter) -> None:
     """Search the videos of cameras whose boxes are not whole, and describe the boxes whose features are not."""
-    missing, bare = ({k: one for k, one in files.items() if not one.state.whole} for files in (boxes, features))
+    missing_boxes, missing_features = (
+        {k: one for k, one in files.items() if not one.state.whole} for files in (boxes, features)
+    )
     cameras, sources = recording.rig.cameras, [feed.source for feed in recording.sources]
-    for k in missing:
+    for k in missing_boxes:
         make_detector(sources[k])  # refused before hours of work, and before anything is written
-    for path in {path for k in bare if (path := sources[k].features) is not None}:
+    for path in {path for k in missing_features if (path := sources[k].features) is not None}:
         FeatureModel(path)
     make_folder(folder)
     with reporter.progress("counting", None):
@@ -84,8 +86,8 @@ def _make(recording: Recording, boxes: Files, features: Files, folder: Path, rep
         found = read_source(_with_boxes(recording.sources[k], boxes[k]).source, cameras[k].size).table
         describe_frames(sources[k], cameras[k], found, file, advance)
 
-    _fill(missing, frames, detect, "detecting", reporter)
-    _fill(bare, frames, describe, "describing", reporter)
+    _fill(missing_boxes, frames, detect, "detecting", reporter)
+    _fill(missing_features, frames, describe, "describing", reporter)
 
 
 def _fill(files: Files, frames: list[int], one_pass: Pass, task: str, reporter: Reporter) -> None:
