@@ -64,8 +64,10 @@ class Detections:
         return len(self.frame)
 
     def of(self, rows: Flags | Ints) -> Detections:
-        """A subset, by index or mask."""
+        """A subset, by index or mask; all of them in their order are not copied, since a day has millions."""
         index = np.flatnonzero(rows) if rows.dtype == bool else rows
+        if np.array_equal(index, np.arange(len(self))):
+            return self
         label = tuple(self.label[k] for k in index) if self.label else ()
         mask = tuple(self.mask[k] for k in index) if self.mask else ()
         features = None if self.features is None else self.features[index]

@@ -180,7 +180,7 @@ class _GrowingTable:
         """Add rows (n,) of the table's dtype to the buffer."""
         if rows.dtype != self._dataset.dtype:
             raise ValueError(f"rows {rows.dtype} for the table {self._dataset.name} of {self._dataset.dtype}")
-        self._held.append(rows.copy())
+        self._held.append(rows if len(rows) >= _HELD_ROWS else rows.copy())
         self._count += len(rows)
         if self._count >= _HELD_ROWS:
             self.flush()
@@ -189,7 +189,7 @@ class _GrowingTable:
         if self._count:
             start = len(self._dataset)
             self._dataset.resize(start + self._count, axis=0)
-            self._dataset[start:] = np.concatenate(self._held)
+            self._dataset[start:] = self._held[0] if len(self._held) == 1 else np.concatenate(self._held)
         self._held, self._count = [], 0
 
 

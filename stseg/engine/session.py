@@ -85,7 +85,8 @@ class Session:
         """From now on fuse evidence, and cut windows, in a thread each while detection goes on."""
         self._fusion = fusion
         if isinstance(self._tracker, CutTracker):
-            self._tracker.solve_by(lambda solution: cuts.submit(self._timed, solution))
+            watch = self.watch  # and not self: a session in a cycle would outlive its segment with all its volumes
+            self._tracker.solve_by(lambda solution: cuts.submit(watch.time("tracking")(solution)))
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
         """The foreground of all views; to be called once for each frame set, in the order of time."""
@@ -156,10 +157,6 @@ class Session:
             self._open.popleft().result()
         self._open.append(self._fusion.submit(fuse))
         return self._open[-1]
-
-    def _timed(self, solution: Callable[[], Commit]) -> Commit:
-        with self.watch.time("tracking"):
-            return solution()
 
     def _fuse(
         self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise

@@ -18,8 +18,8 @@ def with_heights(trajectory: Rows) -> Rows:
     `trajectory` is TRAJECTORY (n,), in any order.
     """
     rows, unknown = trajectory.copy(), ~np.isfinite(trajectory["height"])
-    for track in np.unique(rows["id"][unknown]).tolist():
-        of_track = rows["id"] == track
+    order = np.argsort(rows["id"], kind="stable")
+    for of_track in np.split(order, np.flatnonzero(np.diff(rows["id"][order])) + 1):
         height = median_measured(trajectory["height"][of_track])
-        rows["height"][of_track & unknown] = height if np.isfinite(height) else BODY_HEIGHT
+        rows["height"][of_track[unknown[of_track]]] = height if np.isfinite(height) else BODY_HEIGHT
     return rows

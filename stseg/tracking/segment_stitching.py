@@ -87,11 +87,11 @@ class Stitcher:
         )
 
     def joined(self) -> StitchedTracks:
-        """The segments so far."""
+        """The segments so far, which this keeps as one."""
         parts = self._joined or [StitchedTracks(np.zeros(0, TRAJECTORY), np.zeros(0, np.int64), np.zeros(0, EVENT))]
-        return StitchedTracks(
-            *(np.concatenate([getattr(p, name) for p in parts]) for name in ("committed", "local", "events"))
-        )
+        joined = (np.concatenate([getattr(p, name) for p in parts]) for name in ("committed", "local", "events"))
+        self._joined = [StitchedTracks(*joined)]
+        return self._joined[0]
 
     def _tail(self, lead: Rows) -> Rows:
         """Rows of the earlier segments in the frames of a warm-up."""

@@ -72,11 +72,12 @@ def final_tracks(
     bridged["id"] = linked.identity
     named = linked.identity[: len(committed)]
     kept, dropped = drop_short(bridged[: len(committed)], frame_rate, config.tracking)
-    identity = np.where(np.isin(named, kept["id"]), named, 0)
+    identity = np.where(np.isin(named, kept), named, 0)
     met = _encounters(rows.events, _Names(committed, identity), frame_rate, config.tracking)
     renamed = _renamed(rows.events, _Names(committed, named), linked.links)
-    tracks = fill_gaps(bridged[np.isin(bridged["id"], kept["id"])], frame_rate, config.tracking, True)
-    smoothed = smooth_places(tracks, frame_rate, config.motion)
+    filled = fill_gaps(bridged[np.isin(bridged["id"], kept)], frame_rate, config.tracking, True)
+    smoothed = smooth_places(filled, frame_rate, config.motion)
+    del filled
     doubts = doubt_events(smoothed, bridged[: len(committed)], problem, constraints)
     every_event = np.concatenate([renamed, met, dropped, doubts])
     whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
@@ -115,9 +116,9 @@ def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: T
     """The tracks of a tracker with final identities and places: short ones dropped, short gaps filled."""
     kept, dropped = drop_short(committed, frame_rate, config)
     every_event = np.concatenate([events, dropped])
-    identity = np.where(np.isin(committed["id"], kept["id"]), committed["id"], 0)
-    order = np.argsort(every_event["frame"], kind="stable")
-    return FinalTracks(fill_gaps(kept, frame_rate, config), every_event[order], identity)
+    stays, order = np.isin(committed["id"], kept), np.argsort(every_event["frame"], kind="stable")
+    tracks = fill_gaps(committed[stays], frame_rate, config)
+    return FinalTracks(tracks, every_event[order], np.where(stays, committed["id"], 0))
 
 
 def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
@@ -186,20 +187,15 @@ class _Names:
 def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:
     """BOX rows of a TRAJECTORY, clipped to the images; none where a view does not see the body.
 
-    A row without a height has its track's.
-
-    Sorted by frame, then id, then view, as the trajectory is.
+    A row without a height has its track's. The rows are in the order of the trajectory, then of the views.
     """
-    rows, trajectory = [], with_heights(trajectory)
-    ground = np.column_stack([trajectory["x"], trajectory["y"]])
+    ground, tall = np.column_stack([trajectory["x"], trajectory["y"]]), with_heights(trajectory)["height"].astype(float)
+    every_box = np.zeros((len(trajectory), len(tables)), BOX)
+    visible = np.zeros(every_box.shape, bool)
     for view, table in enumerate(tables):
-        width, height = table.size
-        edges = table.boxes_of(ground, trajectory["height"].astype(float)).clip(0, [width, height] * 2)
-        visible = (edges[:, 2] > edges[:, 0]) & (edges[:, 3] > edges[:, 1])
-        boxes = np.zeros(int(visible.sum()), BOX)
-        boxes["frame"], boxes["id"], boxes["view"] = trajectory["frame"][visible], trajectory["id"][visible], view
-        boxes["left"], boxes["top"] = edges[visible, 0], edges[visible, 1]
-        boxes["width"], boxes["height"] = (edges[visible, 2:] - edges[visible, :2]).T
-        rows.append(boxes)
-    joined = np.concatenate(rows)
-    return joined[np.lexsort((joined["view"], joined["id"], joined["frame"]))]
+        edges, boxes = table.boxes_of(ground, tall).clip(0, [*table.size, *table.size]), every_box[:, view]
+        visible[:, view] = (edges[:, 2:] > edges[:, :2]).all(axis=1)
+        boxes["frame"], boxes["id"], boxes["view"] = trajectory["frame"], trajectory["id"], view
+        boxes["left"], boxes["top"] = edges[:, :2].T
+        boxes["width"], boxes["height"] = (edges[:, 2:] - edges[:, :2]).T
+    return every_box[visible]

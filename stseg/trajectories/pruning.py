@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Ints, Rows
 from stseg.config import TrackingConfig
 from stseg.records.tables import EVENT
 
 
-def drop_short(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Rows, Rows]:
+def drop_short(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Ints, Rows]:
     """Drop tracks shorter than `tracking.minimum_duration`.
 
     Returns
     -------
-    TRAJECTORY, EVENT
-        Rows of the tracks that stay; one event for each dropped track.
+    int64 (k,), EVENT
+        Ids of the tracks that stay; one event for each dropped track.
     """
     ids, where, counts = np.unique(trajectory["id"], return_inverse=True, return_counts=True)
     least = max(2, round(config.minimum_duration * frame_rate))
@@ -23,4 +23,4 @@ def drop_short(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> t
     events = np.zeros(int(short.sum()), EVENT)
     events["frame"], events["kind"], events["id"] = first[short], b"dropped", ids[short]
     events["reason"] = [f"{count} frames, shorter than {least}" for count in counts[short]]
-    return trajectory[~short[where]], events
+    return ids[~short], events

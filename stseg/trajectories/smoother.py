@@ -11,6 +11,7 @@ second rows, and so on.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from stseg.tracking.filter.motion_model import augmented_noise, augmented_transi
 from stseg.tracking.filter.track_filter import EXCLUSION_RADIUS
 from stseg.tracking.row_groups import rows_of_tracks
 
+_ROWS_AT_ONCE = 8192
+"""Rows that are smoothed at a time: each takes 2 kB meanwhile, and of a day there are millions."""
 _DRIFT_PER_FRAME = 0.1
 """Growth of a place's standard deviation a frame away from the nearest detection, metres."""
 
@@ -82,13 +85,13 @@ def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> R
 
     The columns raw_x and raw_y stay the detection's.
     """
-    smoothed = trajectory.copy()
     if not len(trajectory):
-        return smoothed
+        return trajectory.copy()
     places = np.column_stack([trajectory["raw_x"], trajectory["raw_y"]])
     noise = np.array([[trajectory["xx"], trajectory["xy"]], [trajectory["xy"], trajectory["yy"]]]).transpose(2, 0, 1)
     tracks = rows_of_tracks(trajectory["id"])
     ground, covariance = smoothed_paths(trajectory["frame"] / frame_rate, places, noise, tracks, model)
+    smoothed = trajectory.copy()
     smoothed["x"], smoothed["y"] = ground.T
     smoothed["xx"], smoothed["xy"], smoothed["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
     return smoothed
@@ -116,17 +119,58 @@ def smoothed_paths(
         Smoothed places and their covariances.
     """
     order, number = _by_turn(tracks)
-    start, first = np.cumsum(number), int(number[0])
-    before = np.arange(first, len(order)) - np.repeat(number[:-1], number[1:])
     seconds, ground, noise = seconds[order], ground[order][:, :, None], noise[order]
+    parts, begun = _parts(number), list[_States | None]([None])
+
+    def filtered(k: int) -> _Filtered:
+        turns, rows = parts[k]
+        return _filtered(seconds[rows], ground[rows], noise[rows], number[turns], begun[k], model)
+
+    for k, (turns, _) in enumerate(parts[:-1]):
+        (state, spread), *_ = filtered(k)
+        begun.append((state[-number[turns][-1] :].copy(), spread[-number[turns][-1] :].copy()))
+    places, covariance, after = np.empty((len(order), 2)), np.empty((len(order), 2, 2)), None
+    for k, (turns, rows) in reversed(list(enumerate(parts))):
+        state, spread = _smoothed(filtered(k), number[turns], after)
+        after = state[: number[turns][0]], spread[: number[turns][0]]
+        places[order[rows]], covariance[order[rows]] = state[:, :2, 0], spread[:, :2, :2]
+    return places, covariance
+
+
+_States = tuple[Floats, Floats]
+"""States of rows, float64 (n, 6, 1), and their covariances, float64 (n, 6, 6)."""
+_Filtered = tuple[_States, _States, Floats]
+"""States of the rows of some turns, and those before the row's measurement; the transitions to all but the first."""
+
+
+def _parts(number: Ints) -> list[tuple[slice, slice]]:
+    """Turns and rows of parts of about `_ROWS_AT_ONCE`; each begins with the last turn of the one before."""
+    stop = np.cumsum(number)
+    cuts = np.unique([*np.searchsorted(stop, np.arange(_ROWS_AT_ONCE, stop[-1], _ROWS_AT_ONCE)), len(stop) - 1])
+    return [(slice(a, b + 1), slice(stop[a] - number[a], stop[b])) for a, b in pairwise([0, *cuts.tolist()])]
+
+
+def _steps(number: Ints) -> tuple[Ints, list[tuple[slice, slice]]]:
+    """The row before each row after the first turn, and the rows of each such turn, after those before them."""
+    start, before = np.cumsum(number), np.arange(number[0], number.sum()) - np.repeat(number[:-1], number[1:])
+    turns = zip(start.tolist(), number.tolist(), number[1:].tolist(), strict=False)
+    return before, [(slice(k - n, k - n + m), slice(k, k + m)) for k, n, m in turns]
+
+
+def _filtered(
+    seconds: Floats, ground: Floats, noise: Floats, number: Ints, begun: _States | None, model: MotionConfig
+) -> _Filtered:
+    """Filter some turns of rows, of which the first is known, or that of all tracks."""
+    first, (before, steps) = int(number[0]), _steps(number)
     motion, turn = _motions(seconds[first:] - seconds[before], model)
-    matrix = _measurement(noise)
-    white = PLACE_ERROR.white * noise
-    state, spread = np.zeros((len(order), 6, 1)), np.zeros((len(order), 6, 6))
-    state[:first, :2], spread[:first] = ground[:first], _first_spread(noise[:first], matrix[:first], model)
+    matrix, white = _measurement(noise), PLACE_ERROR.white * noise
+    state, spread = np.zeros((len(seconds), 6, 1)), np.zeros((len(seconds), 6, 6))
+    if begun is None:
+        state[:first, :2], spread[:first] = ground[:first], _first_spread(noise[:first], matrix[:first], model)
+    else:
+        state[:first], spread[:first] = begun
     predicted, ahead = state.copy(), spread.copy()
-    turns = [(slice(k - n, k - n + m), slice(k, k + m)) for k, n, m in zip(start, number, number[1:], strict=False)]
-    for old, new in turns:
+    for old, new in steps:
         rows = motion[new.start - first : new.stop - first]
         predicted[new] = rows @ state[old]
         ahead[new] = rows @ spread[old] @ rows.transpose(0, 2, 1) + turn[new.start - first : new.stop - first]
@@ -134,14 +178,21 @@ def smoothed_paths(
         gain = crossed @ np.linalg.inv(matrix[new] @ crossed + white[new])
         state[new] = predicted[new] + gain @ (ground[new] - matrix[new] @ predicted[new])
         spread[new] = ahead[new] - gain @ matrix[new] @ ahead[new]
+    return (state, spread), (predicted, ahead), motion
+
+
+def _smoothed(filtered: _Filtered, number: Ints, after: _States | None) -> _States:
+    """Smooth some turns of rows; the last becomes as the turns after it have it, where there are any."""
+    (state, spread), (predicted, ahead), motion = filtered
+    first, (before, steps) = int(number[0]), _steps(number)
     gains = spread[before] @ motion.transpose(0, 2, 1) @ np.linalg.inv(ahead[first:])
-    for old, new in turns[::-1]:
+    if after is not None:
+        state[-number[-1] :], spread[-number[-1] :] = after
+    for old, new in steps[::-1]:
         gain = gains[new.start - first : new.stop - first]
         state[old] += gain @ (state[new] - predicted[new])
         spread[old] += gain @ (spread[new] - ahead[new]) @ gain.transpose(0, 2, 1)
-    places, covariance = np.empty((len(order), 2)), np.empty((len(order), 2, 2))
-    places[order], covariance[order] = state[:, :2, 0], spread[:, :2, :2]
-    return places, covariance
+    return state, spread
 
 
 def _measurement(noise: Floats) -> Floats:

@@ -1,5 +1,7 @@
 """The tracks of a whole run: events, dropped tracks, and smoothed paths."""
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from checks import drawn, numbers
@@ -125,9 +127,10 @@ def test_nobody_dropped_tracks_and_a_single_measurement() -> None:
     assert found.identity.tolist() == np.where(rows["id"] == 5, 5, 0).tolist()
     assert story(found.events) == [(10, b"dropped", 7, 0)] and set(found.trajectory["id"].tolist()) == {5}
     ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
-    places, spread = smoothed_paths(np.array([3.0]), ground, noise, [np.arange(1)], MOTION)
-    np.testing.assert_array_equal(places, ground)
-    np.testing.assert_array_equal(spread, noise)
+    for same in zip(
+        smoothed_paths(np.array([3.0]), ground, noise, [np.arange(1)], MOTION), (ground, noise), strict=True
+    ):
+        np.testing.assert_array_equal(*same)
 
 
 SMOOTHER_RATE = 8.0
@@ -218,7 +221,8 @@ def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
 def test_paths_at_once_are_as_alone(one: tuple[Ints, Floats, Floats], other: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = (np.concatenate(pair) for pair in zip(one, other, strict=True))
     tracks = np.split(np.arange(len(frames)), [len(one[0])])
-    both = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, tracks, MOTION)
+    with patch("stseg.trajectories.smoother._ROWS_AT_ONCE", 5):
+        both = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, tracks, MOTION)
     for rows in tracks:
         alone = smoothed_paths(frames[rows] / SMOOTHER_RATE, ground[rows], noise[rows], [np.arange(len(rows))], MOTION)
         np.testing.assert_array_equal(both[0][rows], alone[0])

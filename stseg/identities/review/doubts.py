@@ -8,7 +8,6 @@ from scipy.special import expit
 
 from stseg.arrays import Floats, Rows
 from stseg.records.track_heights import median_measured
-from stseg.tracking.row_groups import rows_of_tracks
 
 _ENCOUNTER_DISTANCE = 0.7
 """Distance of an encounter, metres."""
@@ -78,9 +77,9 @@ def identity_doubts(trajectory: Rows, frame_rate: float) -> list[Doubt]:
 
 def _by_track(trajectory: Rows) -> dict[int, Rows]:
     """Rows of each track in the order of time, by rising id."""
-    ordered = trajectory[np.argsort(trajectory["frame"], kind="stable")]
-    divided = [ordered[index] for index in rows_of_tracks(ordered["id"])]
-    return {int(one["id"][0]): one for one in divided}
+    ordered = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    ids, first = np.unique(ordered["id"], return_index=True)
+    return dict(zip(ids.tolist(), np.split(ordered, first[1:]) if len(ids) else [], strict=True))
 
 
 def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
