@@ -68,8 +68,7 @@ def run(
 
 @cache
 def whole(kind: str, tracker: str) -> Run:
-    stop = FRAMES if kind == "boxes" else MASKED
-    return run(kind, recording(kind, stop), tracker)
+    return run(kind, recording(kind, FRAMES if kind == "boxes" else MASKED), tracker)
 
 
 def assert_equal(one: Run, other: Run) -> None:
@@ -124,8 +123,7 @@ def test_frames_have_boxes_candidates_and_windows_rates() -> None:
             own = step.candidates[step.candidates["frame"] == scene.frame]
             true = own[own["status"] == 1]
             np.testing.assert_array_equal(np.column_stack([true["x"], true["y"]]), scene.people.ground)
-            assert (own["evidence"][own["status"] == 0] < 0).all()
-            assert (true["evidence"] > 0).all()
+            assert (own["evidence"][own["status"] == 0] < 0).all() and (true["evidence"] > 0).all()
     timed = np.concatenate([step.timings for step in done.steps])
     assert {b"foreground", b"detection", b"occupancy", b"tracking"} <= set(timed["stage"].tolist())
     assert (timed["seconds"] >= 0).all()
@@ -156,8 +154,7 @@ def test_one_core_alone_or_at_first_gives_the_same(kind: str, alone: int) -> Non
 def test_a_part_keeps_its_frame_numbers(first: int) -> None:
     stop = min(FRAMES - 1, 17)
     part = run("boxes", recording("boxes", FRAMES)[first:stop], first=first)
-    assert part.advanced == list(range(first, stop))
-    assert [s.frame for step in part.steps for s in step.commit.frames] == part.advanced
+    assert [s.frame for step in part.steps for s in step.commit.frames] == part.advanced == list(range(first, stop))
     rows = part.trajectory
     assert np.unique(rows["frame"]).tolist() == part.advanced
     truth = TRUTH[(TRUTH["frame"] >= first) & (TRUTH["frame"] < stop)]
@@ -196,9 +193,8 @@ def test_short_recordings(frames: int) -> None:
 def test_no_frame_sets_and_an_empty_room() -> None:
     pipeline = Pipeline(RIG, ["boxes"] * 4, CONFIG, "cut")
     assert list(run_session(pipeline, [ViewForeground()] * 4, [], 0, lambda _: None)) == []
-    nobody = TRUTH[:0]
     for kind in ("pixels", "boxes"):
-        done = run(kind, list(FRAME_SETS[kind](RIG, nobody, 0, 10)))
+        done = run(kind, list(FRAME_SETS[kind](RIG, TRUTH[:0], 0, 10)))
         assert done.advanced == list(range(10))
         assert len(done.tracks.trajectory) == len(done.tracks.boxes) == len(done.tracks.events) == 0
         assert not done.label.any()
@@ -206,9 +202,8 @@ def test_no_frame_sets_and_an_empty_room() -> None:
 
 def test_a_camera_that_goes_blind() -> None:
     """One of four cameras stops in the middle: nobody is lost."""
-    half = BLIND // 2
     frame_sets = [
-        frame_set if frame_set.frame < half else FrameSet(frame_set.frame, (*frame_set.views[:3], None))
+        frame_set if frame_set.frame < BLIND // 2 else FrameSet(frame_set.frame, (*frame_set.views[:3], None))
         for frame_set in recording("boxes", BLIND)
     ]
     done = run("boxes", frame_sets)
