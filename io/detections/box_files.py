@@ -113,10 +113,10 @@ def _read_lines(path: Path) -> _Lines:
         numbers.extend(_numbers(path, line, fields, columns))
         if len(number) > limits.ROWS:
             raise FormatError(path, f"line {line}", f"more than {limits.ROWS} rows", "no more")
-    values = np.array(numbers, float).reshape(-1, len(columns))
+    values = np.asarray(numbers).reshape(-1, len(columns))
     if is_mot:
         values[:, 5:][values[:, 5:] == -1] = 1
-    return _Lines(path, np.array(number, np.int64), values)
+    return _Lines(path, np.asarray(number), values)
 
 
 def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:

@@ -76,5 +76,8 @@ def unpacked_label(packed: PackedFrame, shape: tuple[int, ...]) -> Labels:
         raise ValueError(str(error)) from error
     if packed.filters or len(values) != size or not inflate.eof:
         raise ValueError(f"labels of a frame packed otherwise than {size} bytes, shuffled and deflated")
-    by_significance = np.frombuffer(values, np.uint8).reshape(4, -1)
-    return np.ascontiguousarray(by_significance.T).view(np.int32).reshape(shape)
+    label = np.zeros(shape, np.int32)
+    for k, part in enumerate(np.frombuffer(values, np.uint8).reshape(4, *shape)):
+        if part.any():
+            label |= part.astype(np.int32) << 8 * k
+    return label

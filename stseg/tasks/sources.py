@@ -141,7 +141,7 @@ def body_height(recording: Recording) -> float:
 def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary]) -> list[str]:
     """One sentence for each number of a rig or its boxes that is probably a mistake."""
     names, rig = [camera.name for camera in recording.rig.cameras], recording.rig
-    feet, by_centres = ([one.feet(foot) for one in summaries] for foot in (_FOOT, _FOOT_OF_CENTRE))
+    feet = [one.feet() for one in summaries]
     if swapped := _swapped(rig, summaries, np.unique(np.concatenate([frame for frame, _ in feet]))):
         return swapped
     paces = (words for one in feet for words in pace_warnings(rig.frame_rate, *one, body_height(recording)))
@@ -150,7 +150,7 @@ def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary])
         *(words for summary in summaries for words in summary.warnings()),
         *twin_warnings(names, [summary.boxes for summary in summaries]),
         *list(paces)[:1],
-        *agreement_warnings(rig.cameras, feet, by_centres),
+        *agreement_warnings(rig.cameras, feet, lambda: [one.feet(_FOOT_OF_CENTRE) for one in summaries]),
     ]
 
 

@@ -75,12 +75,11 @@ def final_tracks(
     identity = np.where(np.isin(named, kept), named, 0)
     met = _encounters(rows.events, _Names(committed, identity), frame_rate, config.tracking)
     renamed = _renamed(rows.events, _Names(committed, named), linked.links)
-    filled = fill_gaps(bridged[np.isin(bridged["id"], kept)], frame_rate, config.tracking, True)
-    smoothed = smooth_places(filled, frame_rate, config.motion)
-    del filled
-    doubts = doubt_events(smoothed, bridged[: len(committed)], problem, constraints)
+    tracks = fill_gaps(bridged[np.isin(bridged["id"], kept)], frame_rate, config.tracking, True)
+    smooth_places(tracks, frame_rate, config.motion)
+    doubts = doubt_events(tracks, bridged[: len(committed)], problem, constraints)
     every_event = np.concatenate([renamed, met, dropped, doubts])
-    whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
+    whole = FinalTracks(tracks, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
     least = config.tracking.return_probability
     if least == 1:
         return whole

@@ -43,10 +43,11 @@ def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfi
     They have extent 0, no sizes, and a covariance that grows with the time to the nearest detection. Longer gaps stay
     open: the path there is unknown.
     """
-    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    step, same = np.diff(table["frame"]), np.diff(table["id"]) == 0
+    order = np.lexsort((trajectory["frame"], trajectory["id"]))
+    step, same = np.diff(trajectory["frame"][order]), np.diff(trajectory["id"][order]) == 0
     gaps = np.flatnonzero(same & (step > 1) & (step <= config.interpolation_gap * frame_rate + 1))
-    return np.concatenate([np.zeros(0, TRAJECTORY), *(_between(table[k], table[k + 1]) for k in gaps.tolist())])
+    ends = zip(trajectory[order[gaps]], trajectory[order[gaps + 1]], strict=True)
+    return np.concatenate([np.zeros(0, TRAJECTORY), *(_between(before, after) for before, after in ends)])
 
 
 def _apart_from(rows: Rows, trajectory: Rows) -> Rows:
@@ -80,21 +81,19 @@ def _between(before: np.void, after: np.void) -> Rows:
     return filled
 
 
-def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> Rows:
-    """A copy of TRAJECTORY rows (n,), sorted by frame, with smoothed x, y and their covariance.
+def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> None:
+    """Smooth x, y and their covariance in TRAJECTORY rows (n,), sorted by frame.
 
     The columns raw_x and raw_y stay the detection's.
     """
     if not len(trajectory):
-        return trajectory.copy()
+        return
     places = np.column_stack([trajectory["raw_x"], trajectory["raw_y"]])
     noise = np.array([[trajectory["xx"], trajectory["xy"]], [trajectory["xy"], trajectory["yy"]]]).transpose(2, 0, 1)
     tracks = rows_of_tracks(trajectory["id"])
     ground, covariance = smoothed_paths(trajectory["frame"] / frame_rate, places, noise, tracks, model)
-    smoothed = trajectory.copy()
-    smoothed["x"], smoothed["y"] = ground.T
-    smoothed["xx"], smoothed["xy"], smoothed["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
-    return smoothed
+    trajectory["x"], trajectory["y"] = ground.T
+    trajectory["xx"], trajectory["xy"], trajectory["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
 
 
 def smoothed_paths(

@@ -4,7 +4,7 @@ Of right views of five real recordings 58 % to 100 % of the feet that do not mee
 own frame (none of 27 views warns: by this, fewer than 11 in 100 do, 95 %); of exchanged ones less than a quarter.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,7 +28,7 @@ Feet = Sequence[tuple[Ints, Floats]]
 """Frames int64 (n,) of each camera's boxes, and where they stand, float64 (n, 2), metres."""
 
 
-def agreement_warnings(cameras: Sequence[Camera], feet: Feet, by_centres: Feet) -> list[str]:
+def agreement_warnings(cameras: Sequence[Camera], feet: Feet, by_centres: Callable[[], Feet]) -> list[str]:
     """A warning that names the cameras whose feet meet those of other cameras no more often than by chance.
 
     Where they meet if each box's left and top are its centre, `by_centres`, it asks for that.
@@ -36,9 +36,10 @@ def agreement_warnings(cameras: Sequence[Camera], feet: Feet, by_centres: Feet) 
     strangers = _strangers(cameras, feet)
     if not strangers:
         return []
-    some = [(by_centres if k in strangers else feet)[k] for k in range(len(cameras))]
+    every = by_centres()
+    some = [(every if k in strangers else feet)[k] for k in range(len(cameras))]
     remedy = "are its file, first frame, columns, image size and lower edges of boxes right?"
-    if not (_strangers(cameras, some) and _strangers(cameras, by_centres)):
+    if not (_strangers(cameras, some) and _strangers(cameras, every)):
         remedy = "are left and top the centres of its boxes? (name these columns x and y)"
     names = ", ".join(cameras[k].name for k in strangers)
     return [f"{names}: people stand where other cameras see them no more often than by chance: {remedy}"]
@@ -49,8 +50,7 @@ def _strangers(cameras: Sequence[Camera], feet: Feet) -> list[int]:
     frame, ground = np.concatenate([one for one, _ in feet]), np.concatenate([one for _, one in feet])
     order = np.argsort(frame, kind="stable")
     view, frame, ground = view[order], frame[order], ground[order]
-    places = [_visible(k, cameras, ground) for k in range(len(cameras))]
-    return [k for k, visible in enumerate(places) if _is_stranger(k, visible, view, frame, ground)]
+    return [k for k in range(len(cameras)) if _is_stranger(k, cameras, view, frame, ground)]
 
 
 def _visible(index: int, cameras: Sequence[Camera], ground: Floats) -> Flags:
@@ -64,25 +64,28 @@ def _visible(index: int, cameras: Sequence[Camera], ground: Floats) -> Flags:
     return visible
 
 
-def _is_stranger(index: int, visible: Flags, view: Ints, frame: Ints, ground: Floats) -> bool:
-    chosen = np.flatnonzero((view == index) & visible)
+def _is_stranger(index: int, cameras: Sequence[Camera], view: Ints, frame: Ints, ground: Floats) -> bool:
+    chosen = np.flatnonzero(view == index)
+    chosen = chosen[_visible(index, cameras, ground[chosen])]
     kept = np.unique(frame[chosen])
     chosen = chosen[np.isin(frame[chosen], kept[:: max(1, len(kept) // _FRAMES)])]
     if len(chosen) < _LEAST_FEET:
         return False
     first, length = int(frame[0]), int(frame[-1] - frame[0]) + 1
     lags = [int(length * part) for part in _LAGS]
-    own_feet, other_feet = (cKDTree(_apart(frame[of], ground[of])) for of in (view == index, view != index))
 
-    def share(lag: int, partners: cKDTree) -> float:
+    def share(lag: int, partners: Flags) -> float:
         later = first + (frame[chosen] - first + lag) % length  # the recording begins anew at its end
-        away, _ = partners.query(_apart(later, ground[chosen]), distance_upper_bound=_RADIUS)
+        then = np.flatnonzero(partners & np.isin(frame, later))  # a day has too many others for a tree
+        away, _ = cKDTree(_apart(frame[then], ground[then])).query(
+            _apart(later, ground[chosen]), distance_upper_bound=_RADIUS
+        )
         return float(np.mean(away < _RADIUS))
 
-    if np.mean([share(lag, own_feet) for lag in lags]) > _STANDING:
+    if np.mean([share(lag, view == index) for lag in lags]) > _STANDING:
         return False
-    chance = np.mean([share(lag, other_feet) for lag in lags])
-    return bool(share(0, other_feet) - chance < _AGREEMENT * (1 - chance))
+    chance = np.mean([share(lag, view != index) for lag in lags])
+    return bool(share(0, view != index) - chance < _AGREEMENT * (1 - chance))
 
 
 def _apart(frame: Ints, ground: Floats) -> Floats:

@@ -58,7 +58,7 @@ FINAL: dict[str, tuple[str, Any]] = {
     "short gaps filled": (f"{_FINAL}.interpolated_rows", lambda rows, *_: rows[:0]),
     "encounters": ("stseg.tracking.row_groups._meetings", lambda rows, _: (rows["id"][:0], rows["frame"][:0])),
     "least error of places": (f"{_OBSERVED}._LEAST_PLACE_ERROR", 1e-3),
-    "last smoothing": (f"{_FINAL}.smooth_places", lambda rows, *_: rows),
+    "last smoothing": (f"{_FINAL}.smooth_places", lambda *_: None),
 }
 """The same of final tracks, which are found again from the rows of one run."""
 
