@@ -118,12 +118,11 @@ def smoothed_paths(
         Smoothed places and their covariances.
     """
     order, number = _by_turn(tracks)
-    seconds, ground, noise = seconds[order], ground[order][:, :, None], noise[order]
     parts, begun = _parts(number), list[_States | None]([None])
 
     def filtered(k: int) -> _Filtered:
-        turns, rows = parts[k]
-        return _filtered(seconds[rows], ground[rows], noise[rows], number[turns], begun[k], model)
+        turns, rows = parts[k][0], order[parts[k][1]]
+        return _filtered(seconds[rows], ground[rows][:, :, None], noise[rows], number[turns], begun[k], model)
 
     for k, (turns, _) in enumerate(parts[:-1]):
         (state, spread), *_ = filtered(k)
