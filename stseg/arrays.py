@@ -26,6 +26,12 @@ Rows = NDArray[np.void]
 AnyArray = NDArray[Any]
 
 
+def by_track(table: Rows) -> list[Rows]:
+    """The rows of each `id` in the order of `frame`, by rising id: parts of one copy."""
+    table = table[np.lexsort((table["frame"], table["id"]))]
+    return np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(table) else []
+
+
 def columns(text: str) -> np.dtype[np.void]:
     """Dtype of rows with such columns as in `"frame:<i8 score:<f4"`."""
     return np.dtype([(name, kind) for name, kind in (column.split(":") for column in text.split())])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit, ndtr
 
-from stseg.arrays import Flags, Floats, Ints, Rows, columns
+from stseg.arrays import Flags, Floats, Ints, Rows, by_track, columns
 from stseg.geometry.grid import inside_polygon
 
 
@@ -117,12 +117,6 @@ def zone_visits(zone: Zone, trajectory: Rows, frame_rate: float, patience: float
                 (zone.name, int(track["id"][0]), first, last, first / frame_rate, dwell, start > 0, stop < len(track))
             )
     return np.sort(np.array(visits, VISIT), order=["first", "id"])
-
-
-def by_track(trajectory: Rows) -> list[Rows]:
-    """The rows of each track in order of time."""
-    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    return [track for track in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(track)]
 
 
 def stays(track: Rows, frame_rate: float) -> list[Rows]:

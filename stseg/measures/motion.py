@@ -5,8 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows, columns
-from stseg.measures.areas import by_track, stays
+from stseg.arrays import Floats, Ints, Rows, by_track, columns
+from stseg.measures.areas import stays
 
 TRACK_MEASURE = columns(
     "id:<i8 first:<i8 last:<i8 seconds:<f8 distance:<f8 mean_speed:<f8 "

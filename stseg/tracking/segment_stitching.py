@@ -126,21 +126,15 @@ def _deaths(rows: Rows, others: set[int], reason: str) -> list[_EventRow]:
     return [(int(rows["frame"][rows["id"] == i].max()), b"death", i, 0, reason.encode()) for i in gone]
 
 
-def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> None:
-    """Rename the labels of a part of the volume to identities of the run, in place; dropped tracks become background.
+def renamed_labels(label: Labels, names: Ints, identity: Ints) -> Labels:
+    """The labels of a frame, int32 (plane, y, x), as identities of the run; dropped tracks become background.
 
-    `label` int32 (time, plane, y, x) holds names of the segment, 0 for background, of `frames` int64 (time,),
-    increasing. `rows` TRAJECTORY (n,) are under names of the segment, and `identity` int64 (n,) is that of each row in
-    the run, 0 for a dropped track.
+    `names` int64 (n,) are those of the frame's tracks in the segment, and `identity` int64 (n,) those in the run, 0 for
+    a dropped track.
     """
-    most = max(int(label.max(initial=0)), int(rows["id"].max(initial=0)))
-    order = np.argsort(rows["frame"], kind="stable")
-    bounds = rows["frame"][order].searchsorted([frames, frames + 1])
-    for cells, first, stop in zip(label, *bounds, strict=True):
-        indices = order[first:stop]
-        names = np.zeros(most + 1, np.int32)
-        names[rows["id"][indices]] = identity[indices]
-        cells[...] = names[cells]
+    identity_of = np.zeros(max(int(label.max(initial=0)), int(names.max(initial=0))) + 1, np.int32)
+    identity_of[names] = identity
+    return identity_of[label]
 
 
 def matches(before: Rows, lead: Rows) -> dict[int, int]:

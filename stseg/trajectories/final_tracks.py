@@ -130,7 +130,7 @@ def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     for role in ("id", "other"):
         named[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
     born, dead = (np.isin(named["kind"], kind) & np.isin(events["id"], name_at.track) for kind in (b"birth", b"death"))
-    first, last = (np.array([at(name) for name in named["id"]]) for at in (name_at.first, name_at.last))
+    first, last = (np.array([at.get(name, -1) for name in named["id"].tolist()]) for at in name_at.ends)
     named["frame"][born] = np.maximum(named["frame"], first)[born]
     named["frame"][dead] = np.minimum(named["frame"], last)[dead]
     refuted = (born & (first < named["frame"])) | (dead & (last > named["frame"]))
@@ -145,7 +145,7 @@ def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
 def _encounters(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
     """Encounters between retained tracks."""
     tracks = set(name_at.track.tolist())
-    last = max(name_at.until.values(), default=-1)
+    last = int(name_at.frame.max(initial=-1))
 
     def name(track: int, frame: int) -> int:
         return name_at.name(track, frame) if track in tracks else 0
@@ -163,8 +163,7 @@ class _Names:
         since, until = np.full(len(names), np.iinfo(np.int64).max), np.full(len(names), -1)
         np.minimum.at(since, where, committed["frame"])
         np.maximum.at(until, where, committed["frame"])
-        self.since: dict[int, int] = dict(zip(names.tolist(), since.tolist(), strict=True))
-        self.until: dict[int, int] = dict(zip(names.tolist(), until.tolist(), strict=True))
+        self.ends = [dict(zip(names.tolist(), frames.tolist(), strict=True)) for frames in (since, until)]
 
     def name(self, track: int, frame: int) -> int:
         """The identity of a track in a frame, or at its last row before; an unknown track keeps its number."""
@@ -173,14 +172,6 @@ class _Names:
             return int(track)
         row = int(self.frame[first:stop].searchsorted(frame, side="right")) - 1
         return int(self.identity[first + max(row, 0)])
-
-    def first(self, identity: int) -> int:
-        """The first frame of an identity; -1 if it has none."""
-        return self.since.get(identity, -1)
-
-    def last(self, identity: int) -> int:
-        """The last frame of an identity; -1 if it has none."""
-        return self.until.get(identity, -1)
 
 
 def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:

@@ -77,9 +77,8 @@ def _is_stranger(index: int, cameras: Sequence[Camera], view: Ints, frame: Ints,
     def share(lag: int, partners: Flags) -> float:
         later = first + (frame[chosen] - first + lag) % length  # the recording begins anew at its end
         then = np.flatnonzero(partners & np.isin(frame, later))  # a day has too many others for a tree
-        away, _ = cKDTree(_apart(frame[then], ground[then])).query(
-            _apart(later, ground[chosen]), distance_upper_bound=_RADIUS
-        )
+        tree = cKDTree(_apart(frame[then], ground[then]))
+        away, _ = tree.query(_apart(later, ground[chosen]), distance_upper_bound=_RADIUS)
         return float(np.mean(away < _RADIUS))
 
     if np.mean([share(lag, view == index) for lag in lags]) > _STANDING:

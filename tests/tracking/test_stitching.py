@@ -11,7 +11,7 @@ from stseg.config import Config, SegmentConfig, TrackingConfig
 from stseg.engine.offline.segments import segments
 from stseg.records.tables import TRAJECTORY
 from stseg.trackers.rows import event_rows
-from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
+from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, renamed_labels
 from stseg.tracking.windows.windows import windows
 
 
@@ -114,5 +114,6 @@ def test_renaming_maps_every_cell_once(ids: list[int], keys: list[tuple[int, int
     plain = label.copy()
     for cell in np.ndindex(label.shape):
         plain[cell] = name_of.get((int(frames[cell[0]]), int(label[cell])), 0)
-    rename_labels(label, frames, rows, identity)
-    np.testing.assert_array_equal(label, plain)
+    for frame, cells, expected in zip(frames, label, plain, strict=True):
+        here = rows["frame"] == frame
+        np.testing.assert_array_equal(renamed_labels(cells, rows["id"][here], identity[here]), expected)

@@ -1,14 +1,14 @@
 """Assembly of the run file from the segment files: stitched tracks of the whole run, and the volume with their ids."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Ints, Rows
+from stseg.arrays import Ints
 from stseg.engine.offline.calls import Caller, called_here
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
@@ -20,7 +20,7 @@ from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_l
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
-from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
+from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, renamed_labels
 from stseg.trajectories.final_tracks import CommittedRows
 
 _BLOCK = 64
@@ -66,9 +66,12 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
         for _, path in finished:
             _copy(read_run(path), writer)
         joined, tracks, identity = association()
+        order = np.argsort(joined.committed["frame"], kind="stable")
+        frame, names, ids = joined.committed["frame"][order], joined.local[order], identity[order]
         with ThreadPoolExecutor(os.cpu_count()) as packers:
-            for run, rows, ids in _segment_rows(finished, joined, identity):
-                _append_labels(run, rows, ids, writer, packers)
+            for segment, path in finished:
+                here = slice(*frame.searchsorted([segment.first, segment.stop]))
+                _append_labels(read_run(path), frame[here], names[here], ids[here], writer, packers)
         writer.append("trajectory", tracks.trajectory)
         if not find_tracker(job.tracker).final:
             writer.append("committed", joined.committed)
@@ -105,40 +108,18 @@ def _copy(run: Run, writer: RunWriter) -> None:
         writer.append(table, np.asarray(getattr(run, table)))
 
 
-def _segment_rows(
-    finished: Sequence[FinishedSegment], joined: StitchedTracks, identity: Ints
-) -> Iterator[tuple[Run, Rows, Ints]]:
-    """The file of each segment in their order, its committed rows, and the run's track id of each row, 0 for none."""
-    first = 0
-    for segment, path in finished:
-        run = read_run(path)
-        stop = first + int((run.trajectory["frame"] >= segment.first).sum())
-        rows = joined.committed[first:stop].copy()
-        rows["id"] = joined.local[first:stop]
-        yield run, rows, identity[first:stop]
-        first = stop
-
-
-def _append_labels(run: Run, rows: Rows, identity: Ints, writer: RunWriter, packers: Executor) -> None:
+def _append_labels(run: Run, frame: Ints, names: Ints, identity: Ints, writer: RunWriter, packers: Executor) -> None:
     """Append a segment's labels, with the run's track ids, to the run file.
 
-    Frames whose tracks keep their ids are copied as they are packed; the others are renamed side by side.
+    Of each row of the segment are `frame` int64 (n,), rising, the track's name in the segment, and its id in the run,
+    0 for none. Frames whose tracks keep their ids are copied as they are packed; the others are renamed side by side.
     """
-    order = np.argsort(rows["frame"], kind="stable")
-    rows, identity = rows[order], identity[order]
 
-    def renamed(frame: int, label: PackedFrame) -> PackedFrame:
-        of_frame = slice(*rows["frame"].searchsorted([frame, frame + 1]))
-        return _renamed(label, run.views.shape, rows[of_frame], identity[of_frame])
+    def renamed(number: int, label: PackedFrame) -> PackedFrame:
+        here = slice(*frame.searchsorted([number, number + 1]))
+        if (names[here] == identity[here]).all():
+            return label
+        return packed_frame(renamed_labels(unpacked_label(label, run.views.shape), names[here], identity[here]))
 
     for frames, label in run.read_packed_frames(layout.LABEL, _BLOCK):
         writer.append_packed_labels(list(packers.map(renamed, frames.tolist(), label)))
-
-
-def _renamed(label: PackedFrame, shape: tuple[int, ...], rows: Rows, identity: Ints) -> PackedFrame:
-    """The labels of a frame, which are names of a segment, as the run's track ids; rows of the frame."""
-    if (rows["id"] == identity).all():
-        return label
-    cells = unpacked_label(label, shape)
-    rename_labels(cells[None], rows["frame"][:1], rows, identity)
-    return packed_frame(cells)

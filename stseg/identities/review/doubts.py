@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Floats, Rows, by_track
 from stseg.records.track_heights import median_measured
 
 _ENCOUNTER_DISTANCE = 0.7
@@ -77,9 +77,7 @@ def identity_doubts(trajectory: Rows, frame_rate: float) -> list[Doubt]:
 
 def _by_track(trajectory: Rows) -> dict[int, Rows]:
     """Rows of each track in the order of time, by rising id."""
-    ordered = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    ids, first = np.unique(ordered["id"], return_index=True)
-    return dict(zip(ids.tolist(), np.split(ordered, first[1:]) if len(ids) else [], strict=True))
+    return {int(rows["id"][0]): rows for rows in by_track(trajectory)}
 
 
 def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stseg.arrays import Bytes, Floats, Rows
+from stseg.arrays import Bytes, Floats, Rows, by_track
 from stseg.geometry import Grid
 from stseg.reporting.pictures.canvas import MAX_LABELS, blank, chips, disc, fill, outline, stroke, text
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Picture, mixed, track_colour
@@ -99,17 +99,14 @@ class _Thread:
 
 
 def _threads(trajectory: Rows) -> list[_Thread]:
-    count = len(np.unique(trajectory["id"]))
-    width = 3 if count <= 12 else 2 if count <= 60 else 1
-    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    tracks, threads = by_track(trajectory), []
+    width = 3 if len(tracks) <= 12 else 2 if len(tracks) <= 60 else 1
     # A picture shows no more points than that, however long the recording.
-    stride = max(1, len(table) // (_PIECE_POINTS * _MAX_PIECES))
-    threads = []
-    for rows in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
-        if len(rows):
-            kept = np.unique(np.append(np.arange(0, len(rows), stride), len(rows) - 1))
-            places = np.stack([rows["x"], rows["y"], rows["frame"]], -1).astype(float)[kept]
-            threads.append(_Thread(int(rows["id"][0]), places, width))
+    stride = max(1, len(trajectory) // (_PIECE_POINTS * _MAX_PIECES))
+    for rows in tracks:
+        kept = np.unique(np.append(np.arange(0, len(rows), stride), len(rows) - 1))
+        places = np.stack([rows["x"], rows["y"], rows["frame"]], -1).astype(float)[kept]
+        threads.append(_Thread(int(rows["id"][0]), places, width))
     return threads
 
 
