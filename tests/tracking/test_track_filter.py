@@ -10,7 +10,7 @@ from checks import drawn, numbers
 from hypothesis import strategies as st
 from scenes import CONFIG, found, people
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
 from stseg.baselines.huang_wang_2012.kalman_filters import corrected_filters, initial, innovations, predicted_filters
 from stseg.config import MotionConfig
 from stseg.identities.search.hypotheses import correct_place, predicted_variance
@@ -18,7 +18,14 @@ from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.people import People
 from stseg.records.sizes import Sizes
 from stseg.tracking.filter.motion_model import process_noise, transition
-from stseg.tracking.filter.track_filter import BodyPlace, Measurement, PlacePosterior, TrackFilter, TrackState
+from stseg.tracking.filter.track_filter import (
+    BodyPlace,
+    Measurement,
+    PlacePosterior,
+    TrackFilter,
+    TrackState,
+    repetition,
+)
 from stseg.trajectories.smoother import smoothed_paths
 
 RATE = 8.0
@@ -213,13 +220,15 @@ def test_odds_fall_while_out_of_sight_until_patience_ends() -> None:
 
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
-    for found_again in (True, False):
-        track_filter = TrackFilter(RATE, CONFIG)
-        assert track_filter.update(0, GHOSTS, found(people((0.5, 0.5)), evidence=-1.0)).shape == (0,)
+    boxes, pixels = Boxes(np.zeros((0, 4)), np.zeros(0)), np.zeros((1, 1), np.float32)
+    cases: list[tuple[bool, ViewEvidence, float]] = [(True, boxes, -3.0), (False, boxes, -3.0), (True, pixels, -1.0)]
+    for found_again, view, odds in cases:
+        track_filter, almost = TrackFilter(RATE, CONFIG), found(people((0.5, 0.5)), evidence=-1.0)
+        assert track_filter.update(0, GHOSTS, almost, repetition([None, view])).shape == (0,)
         expected = track_filter.predict(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
-        assert expected.existence[0] < -1.0  # a second look at the same thing is not a second witness
+        assert expected.existence[0] == odds  # a second box of the same thing is not a second witness
         assert track_filter.issued == 0
         now = found(people((0.52, 0.5)), expected) if found_again else GHOSTS
         assert track_filter.update(1, now, GHOSTS).tolist() == [1] * found_again
@@ -230,7 +239,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
 def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
     track_filter = TrackFilter(RATE, CONFIG)
-    track_filter.update(0, found(people((0, 0))), found(people((place, 0.0)), evidence=evidence))
+    track_filter.update(0, found(people((0, 0))), found(people((place, 0.0)), evidence=evidence), 2.0)
     assert len(track_filter.predict(1) or ()) == looked_for
     assert [track.track for track in track_filter.tracks] == [1, 0][:looked_for]
 

@@ -8,12 +8,13 @@ just crossed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
 from stseg.config import Config, MotionConfig
 from stseg.geometry.distances import distances
 from stseg.noise.lasting_error import PLACE_ERROR
@@ -26,10 +27,11 @@ _SIZE_DRIFT = 0.002
 """Random walk of a person's apparent height and width, metres per square root of a second: shoes, stoop, lens."""
 DETECTED_LOG_ODDS = 1.0
 """Greatest log-odds that a person detected in one frame is detected in the next, nats."""
-_LEAST_EVIDENCE = -4.0
-"""Evidence below which a rejected candidate starts no tentative track, nats."""
-_REPETITION_DISCOUNT = 2.0
-"""Discount of a rejected candidate's evidence: consecutive frames are not independent, nats."""
+_LEAST_ODDS = -6.0
+"""Log-odds below which a rejected candidate starts no tentative track, nats."""
+_REPETITION = 2.0
+"""Part of a rejected candidate's evidence by boxes that the next frame repeats, nats: a detector's errors last. Pixels
+count for as many observations as are independent already (`effective_observations`)."""
 _NUMBERS_OF_BRANCH = 10_000
 """Numbers that are left for tracks that begin beside a branch, which lasts for seconds."""
 EXCLUSION_RADIUS = 0.5
@@ -179,8 +181,10 @@ class TrackFilter:
             np.array([t.odds for t in predicted]),
         )
 
-    def update(self, frame: int, people: People, ghosts: People) -> Ints:
+    def update(self, frame: int, people: People, ghosts: People, repeated: float = 0.0) -> Ints:
         """The track of each detection of a frame that was explained with `predict` as its prior.
+
+        `repeated` is the part of the ghosts' evidence that the next frame repeats (`repetition`), nats.
 
         Returns
         -------
@@ -204,7 +208,7 @@ class TrackFilter:
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = self._grounds([*detected, *(predicted[k] for k in missed)])
-        tentative = self._tentative(frame, ghosts, standing)
+        tentative = self._tentative(frame, ghosts, ghosts.evidence - repeated, standing)
         self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
         return names
@@ -236,15 +240,16 @@ class TrackFilter:
         undetected = seconds - 1 / self.frame_rate
         return track.predicted(seconds, self.motion)._replace(odds=track.odds - EXISTENCE_DECAY * undetected)
 
-    def _tentative(self, frame: int, ghosts: People, standing: Floats) -> list[TrackState]:
+    def _tentative(self, frame: int, ghosts: People, odds: Floats, standing: Floats) -> list[TrackState]:
         """Tentative tracks of rejected candidates: evidence adds up if the next frame shows them again.
 
-        None begins near the places of other tracks, `standing` float64 (n, 2), metres.
+        Their log-odds are float64 (n,), nats. None begins near the places of other tracks, `standing` float64 (n, 2),
+        metres.
         """
         excluded = distances(ghosts.ground, standing).min(1, initial=np.inf) < EXCLUSION_RADIUS
         return [
-            self._birth(frame, ghosts, j)._replace(odds=float(ghosts.evidence[j]) - _REPETITION_DISCOUNT)
-            for j in np.flatnonzero(~excluded & (ghosts.evidence > _LEAST_EVIDENCE)).tolist()
+            self._birth(frame, ghosts, j)._replace(odds=float(odds[j]))
+            for j in np.flatnonzero(~excluded & (odds > _LEAST_ODDS)).tolist()
         ]
 
     def _birth(self, frame: int, people: People, j: int) -> TrackState:
@@ -257,6 +262,11 @@ class TrackFilter:
         state, prior = np.append(people.ground[j], np.zeros(4)), self.body
         sizes = (prior.height_mean, prior.height_spread**2, prior.width_mean, prior.width_spread**2)
         return TrackState(0, frame, state, spread, *sizes, 0.0)
+
+
+def repetition(evidence: Sequence[ViewEvidence]) -> float:
+    """Part of the evidence of views for a rejected candidate that the next frame repeats, nats."""
+    return _REPETITION if any(isinstance(view, Boxes) for view in evidence) else 0.0
 
 
 def _measurements(size: Floats, noise: float) -> list[Measurement]:
