@@ -221,9 +221,12 @@ def test_odds_fall_while_out_of_sight_until_patience_ends() -> None:
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
     boxes, pixels = Boxes(np.zeros((0, 4)), np.zeros(0)), np.zeros((1, 1), np.float32)
-    cases: list[tuple[bool, ViewEvidence, float]] = [(True, boxes, -3.0), (False, boxes, -3.0), (True, pixels, -1.0)]
-    for found_again, view, odds in cases:
-        track_filter, almost = TrackFilter(RATE, CONFIG), found(people((0.5, 0.5)), evidence=-1.0)
+    cases: list[tuple[bool, ViewEvidence, int, float]] = [
+        *((again, boxes, 4, -3.0) for again in (True, False)),
+        *((True, pixels, views, odds) for views, odds in ((2, -3.0), (3, -1.0))),
+    ]
+    for found_again, view, views, odds in cases:
+        track_filter, almost = TrackFilter(RATE, CONFIG), found(people((0.5, 0.5)), evidence=-1.0, views=views)
         assert track_filter.update(0, GHOSTS, almost, repetition([None, view])).shape == (0,)
         expected = track_filter.predict(1)
         assert expected is not None

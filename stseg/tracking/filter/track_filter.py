@@ -30,8 +30,10 @@ DETECTED_LOG_ODDS = 1.0
 _LEAST_ODDS = -6.0
 """Log-odds below which a rejected candidate starts no tentative track, nats."""
 _REPETITION = 2.0
-"""Part of a rejected candidate's evidence by boxes that the next frame repeats, nats: a detector's errors last. Pixels
-count for as many observations as are independent already (`effective_observations`)."""
+"""Part of a rejected candidate's evidence that the next frame repeats, nats, by boxes or fewer than `_SURE_VIEWS`: errors
+of a detector last, and so do ghosts where two silhouettes meet."""
+_SURE_VIEWS = 3
+"""Views of pixels with evidence for a candidate from which it adds up in full: three lines seldom meet by chance."""
 _NUMBERS_OF_BRANCH = 10_000
 """Numbers that are left for tracks that begin beside a branch, which lasts for seconds."""
 EXCLUSION_RADIUS = 0.5
@@ -184,7 +186,7 @@ class TrackFilter:
     def update(self, frame: int, people: People, ghosts: People, repeated: float = 0.0) -> Ints:
         """The track of each detection of a frame that was explained with `predict` as its prior.
 
-        `repeated` is the part of the ghosts' evidence that the next frame repeats (`repetition`), nats.
+        `repeated` is the part of the evidence for ghosts in many views that the next frame repeats (`repetition`), nats.
 
         Returns
         -------
@@ -208,7 +210,8 @@ class TrackFilter:
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = self._grounds([*detected, *(predicted[k] for k in missed)])
-        tentative = self._tentative(frame, ghosts, ghosts.evidence - repeated, standing)
+        few = (ghosts.view_evidence != 0).sum(0) < _SURE_VIEWS
+        tentative = self._tentative(frame, ghosts, ghosts.evidence - np.where(few, _REPETITION, repeated), standing)
         self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
         return names
@@ -265,7 +268,7 @@ class TrackFilter:
 
 
 def repetition(evidence: Sequence[ViewEvidence]) -> float:
-    """Part of the evidence of views for a rejected candidate that the next frame repeats, nats."""
+    """Part of the evidence of many views for a rejected candidate that the next frame repeats, nats."""
     return _REPETITION if any(isinstance(view, Boxes) for view in evidence) else 0.0
 
 
