@@ -30,8 +30,8 @@ DETECTED_LOG_ODDS = 1.0
 _LEAST_ODDS = -6.0
 """Log-odds below which a rejected candidate starts no tentative track, nats."""
 _REPETITION = 2.0
-"""Part of a rejected candidate's evidence that the next frame repeats, nats, by boxes or fewer than `_SURE_VIEWS`: errors
-of a detector last, and so do ghosts where two silhouettes meet."""
+"""Part of a rejected candidate's evidence that the next frame repeats, nats, by boxes or by fewer than `_SURE_VIEWS`:
+errors of a detector last, and so do ghosts where two silhouettes meet."""
 _SURE_VIEWS = 3
 """Views of pixels with evidence for a candidate from which it adds up in full: three lines seldom meet by chance."""
 _NUMBERS_OF_BRANCH = 10_000
@@ -186,7 +186,8 @@ class TrackFilter:
     def update(self, frame: int, people: People, ghosts: People, repeated: float = 0.0) -> Ints:
         """The track of each detection of a frame that was explained with `predict` as its prior.
 
-        `repeated` is the part of the evidence for ghosts in many views that the next frame repeats (`repetition`), nats.
+        `repeated` is the part of the evidence of many views for ghosts that the next frame repeats, nats; see
+        `repetition`.
 
         Returns
         -------
