@@ -24,7 +24,7 @@ from stseg.tracking.filter.track_filter import (
     PlacePosterior,
     TrackFilter,
     TrackState,
-    repetition,
+    repeated_evidence,
 )
 from stseg.trajectories.smoother import smoothed_paths
 
@@ -227,7 +227,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     ]
     for found_again, view, views, odds in cases:
         track_filter, almost = TrackFilter(RATE, CONFIG), found(people((0.5, 0.5)), evidence=-1.0, views=views)
-        assert track_filter.update(0, GHOSTS, almost, repetition([None, view])).shape == (0,)
+        assert track_filter.update(0, GHOSTS, almost, repeated_evidence([None, view])).shape == (0,)
         expected = track_filter.predict(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])

@@ -29,9 +29,9 @@ DETECTED_LOG_ODDS = 1.0
 """Greatest log-odds that a person detected in one frame is detected in the next, nats."""
 _LEAST_ODDS = -6.0
 """Log-odds below which a rejected candidate starts no tentative track, nats."""
-_REPETITION = 2.0
-"""Part of a rejected candidate's evidence that the next frame repeats, nats, by boxes or by fewer than `_SURE_VIEWS`:
-errors of a detector last, and so do ghosts where two silhouettes meet."""
+_REPEATED_EVIDENCE = 2.0
+"""Part of a rejected candidate's evidence that the next frame repeats, nats: in rigs with boxes, where a detector's
+errors last, and by fewer than `_SURE_VIEWS`, where ghosts last in which two silhouettes meet."""
 _SURE_VIEWS = 3
 """Views of pixels with evidence for a candidate from which it adds up in full: three lines seldom meet by chance."""
 _NUMBERS_OF_BRANCH = 10_000
@@ -186,8 +186,7 @@ class TrackFilter:
     def update(self, frame: int, people: People, ghosts: People, repeated: float = 0.0) -> Ints:
         """The track of each detection of a frame that was explained with `predict` as its prior.
 
-        `repeated` is the part of the evidence of many views for ghosts that the next frame repeats, nats; see
-        `repetition`.
+        `repeated` is the part of the ghosts' evidence that the next frame repeats (`repeated_evidence`), nats.
 
         Returns
         -------
@@ -211,8 +210,7 @@ class TrackFilter:
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = self._grounds([*detected, *(predicted[k] for k in missed)])
-        few = (ghosts.view_evidence != 0).sum(0) < _SURE_VIEWS
-        tentative = self._tentative(frame, ghosts, ghosts.evidence - np.where(few, _REPETITION, repeated), standing)
+        tentative = self._tentative(frame, ghosts, repeated, standing)
         self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
         return names
@@ -244,12 +242,13 @@ class TrackFilter:
         undetected = seconds - 1 / self.frame_rate
         return track.predicted(seconds, self.motion)._replace(odds=track.odds - EXISTENCE_DECAY * undetected)
 
-    def _tentative(self, frame: int, ghosts: People, odds: Floats, standing: Floats) -> list[TrackState]:
+    def _tentative(self, frame: int, ghosts: People, repeated: float, standing: Floats) -> list[TrackState]:
         """Tentative tracks of rejected candidates: evidence adds up if the next frame shows them again.
 
-        Their log-odds are float64 (n,), nats. None begins near the places of other tracks, `standing` float64 (n, 2),
-        metres.
+        None begins near the places of other tracks, `standing` float64 (n, 2), metres.
         """
+        by_few = (ghosts.view_evidence != 0).sum(0) < _SURE_VIEWS
+        odds = ghosts.evidence - np.where(by_few, _REPEATED_EVIDENCE, repeated)
         excluded = distances(ghosts.ground, standing).min(1, initial=np.inf) < EXCLUSION_RADIUS
         return [
             self._birth(frame, ghosts, j)._replace(odds=float(odds[j]))
@@ -268,9 +267,9 @@ class TrackFilter:
         return TrackState(0, frame, state, spread, *sizes, 0.0)
 
 
-def repetition(evidence: Sequence[ViewEvidence]) -> float:
-    """Part of the evidence of many views for a rejected candidate that the next frame repeats, nats."""
-    return _REPETITION if any(isinstance(view, Boxes) for view in evidence) else 0.0
+def repeated_evidence(evidence: Sequence[ViewEvidence]) -> float:
+    """Part of a rejected candidate's evidence that the next frame repeats where `_SURE_VIEWS` bear it, nats."""
+    return _REPEATED_EVIDENCE if any(isinstance(view, Boxes) for view in evidence) else 0.0
 
 
 def _measurements(size: Floats, noise: float) -> list[Measurement]:
