@@ -89,7 +89,7 @@ def run(
     from stseg.engine.workers.workforce import Workforce
     from stseg.io.config_file import read_config
     from stseg.io.recording.rigs import read_recording
-    from stseg.tasks.warnings import source_warnings
+    from stseg.tasks.warnings import run_warnings, source_warnings
 
     chosen, workforce = FrameRange.parsed(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_recording(rig), TerminalReporter()
@@ -126,7 +126,7 @@ def run(
     done = track_recording(
         recording, output, resolved, tracker, volume, chosen, workforce, reporter, known=known, overwrite=overwrite
     )
-    warn(words for words in done.warnings if words not in earlier)
+    warn(words for words in run_warnings(done, earlier) if words not in earlier)
     print(_summary(done))
     if labels is not None:
         count = label_images(done, labels, config=resolved, overwrite=overwrite, progress=reporter)

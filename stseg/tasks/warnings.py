@@ -1,6 +1,6 @@
 """Warnings about a finished run: views that are silent, moved, off or torn, and bodies other than configured."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -22,29 +22,34 @@ _CHECKED_FRAMES = 160
 """Frames by which swapped cameras are found where a view looks wrong."""
 _DOUBTFUL_MISSES = 0.1
 """Miss rate from which they are looked for: they leave rates of 0.13 to 0.7, right views 0.03 to 0.1."""
+_UNLIKE = 1.4
+"""Least ratio of that rate to the least one of all views or to the first guess: swaps leave 1.7 or more."""
 _MOVED = 1.0
 """Least shift of an image that counts as a moved camera, pixels."""
 
 
-def run_warnings(run: Run) -> list[str]:
-    """One sentence for everything that a user should look at: `Run.warnings`, `stseg inspect`, the report."""
+def run_warnings(run: Run, of_sources: Sequence[str] | None = None) -> list[str]:
+    """One sentence for everything that a user should look at: `Run.warnings`, `stseg inspect`, the report.
+
+    Those of the recording's sources are computed anew if they are not given.
+    """
     if not len(run.frames):
         return ["there are no frames"]
-    body = parse_config(run.provenance.config, f"{run.path}: the configuration").body
+    config = parse_config(run.provenance.config, f"{run.path}: the configuration")
     return [
         *_emptiness(run),
         *explained_by_swap(
             run.recording,
             int(run.frames[0]),
             [
-                *source_warnings(run.recording),
+                *(source_warnings(run.recording) if of_sources is None else of_sources),
                 *_missing_images(run.recording),
                 *track_warnings(run.frame_rate, run.trajectory),
                 *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
-                *body_warnings(run.cameras, run.trajectory, run.rates, body),
+                *body_warnings(run.cameras, run.trajectory, run.rates, config.body),
                 *rig_warnings(run),
             ],
-            _misses(run),
+            _are_misses_doubtful(run, config.detection.pixel_miss_rate),
         ),
         *crowd_warnings(run.events),
     ]
@@ -63,20 +68,24 @@ def _emptiness(run: Run) -> Iterator[str]:
         yield f"no view sees {100 * unseen:.0f} % of the ground"
 
 
-def _misses(run: Run) -> float:
-    """The largest miss rate at the end of a run of a view by pixels; boxes are compared with the sources."""
+def _are_misses_doubtful(run: Run, guess: float) -> bool:
+    """Whether a view by pixels misses much at the end of a run, and more than others; boxes are compared before it.
+
+    In a crowd, and while the first guess prevails, all views miss alike.
+    """
     last = run.rates[run.rates["frame"] == run.rates["frame"].max(initial=-1)]
     pixels = [one.source.kind != "boxes" for one in run.recording.sources]
-    return max((float(row["miss"]) for row in last if pixels[row["view"]]), default=0.0)
+    misses = [float(row["miss"]) for row in last if pixels[row["view"]]]
+    return bool(misses) and max(misses) > max(_DOUBTFUL_MISSES, _UNLIKE * min(guess, *misses))
 
 
-def explained_by_swap(recording: Recording, first: int, warnings: list[str], misses: float = 0.0) -> list[str]:
+def explained_by_swap(recording: Recording, first: int, warnings: list[str], is_doubtful: bool = False) -> list[str]:
     """The warnings, or that of two swapped cameras, by the frames from `first` of sources that still exist.
 
-    It is checked where a warning names a camera, or one misses much of the bodies: a check takes seconds.
+    It is checked where a warning names a camera, or its misses are doubtful: a check takes seconds.
     """
     named = any(camera.name in warning for camera in recording.rig.cameras for warning in warnings)
-    if not named and misses < _DOUBTFUL_MISSES:
+    if not named and not is_doubtful:
         return warnings
     from stseg.tasks.calibration.check import check_rig  # only here: other runs do without its libraries
 

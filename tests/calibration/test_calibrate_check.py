@@ -184,7 +184,7 @@ class TestCommand:
         assert explained_by_swap(recording, 0, said) == said and explained_by_swap(swapped, 0, []) == []
         (warning,) = explained_by_swap(swapped, 0, said)
         assert "cam2 and cam4" in warning and "seem to be swapped" in warning
-        told = explained_by_swap(swapped, 0, [], 0.3), recording_warnings(swapped, summarise_sources(swapped))
+        told = explained_by_swap(swapped, 0, [], True), recording_warnings(swapped, summarise_sources(swapped))
         assert told == ([warning], [warning])
         for k in range(4):  # people before a wall of each camera's own brightness
             pictures = [np.full((*SIZE[::-1], 3), 40 + 50 * k, np.uint8) for _ in range(50)]

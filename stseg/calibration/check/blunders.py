@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,8 +23,6 @@ from stseg.geometry import Camera, Grid, Rig
 
 BoxesByFrame = Mapping[int, Sequence[Floats]]
 """Boxes of every view, float64 (n, 4), by frame."""
-Standing = tuple[Ints, Floats]
-"""Numbers of frames int64 (n,), and the places float64 (n, 2) where people stand in them, metres."""
 _SWAP_GAIN = 1.2
 """Least ratio of people of two views who meet others, after swapping their streams to before.
 
@@ -37,6 +36,17 @@ _MEETING_DISTANCE, _LAGS = 0.5, (0.3, 0.5, 0.7)
 """Distance within which people of two views meet, metres; shifts in time that show chance, lengths of the frames."""
 _DELAY_MISFIT = 0.75
 """Share of the misfit that a delay may leave for the stream to count as delayed."""
+
+
+class Standing(NamedTuple):
+    """Where the people of a stream stand."""
+
+    frame: Ints
+    """int64 (n,): numbers of frames."""
+    ground: Floats
+    """float64 (n, 2): their places in these, metres."""
+    tree: cKDTree
+    """For neighbours in one frame: places as in `_apart`."""
 
 
 @dataclass(frozen=True)
@@ -71,18 +81,22 @@ def find_swapped_streams(rig: Rig, boxes_by_frame: BoxesByFrame) -> tuple[tuple[
     places = [_standing(camera, rig.grid, boxes) for camera, boxes in zip(rig.cameras, streams, strict=True)]
     now = np.zeros((len(places), len(places), 2))
     for a, b in combinations(range(len(places)), 2):
-        now[a, b] = now[b, a] = _meetings(places[a], places[b], len(frames))
+        now[a, b] = now[b, a] = _beyond_chance([(places[a], places[b])], len(frames))
     gains, best = dict[tuple[int, int], float](), 0.0
     for a, b in combinations(range(len(places)), 2):
         if rig.cameras[a].size != rig.cameras[b].size:
             continue
         swapped = _standing(rig.cameras[a], rig.grid, streams[b]), _standing(rig.cameras[b], rig.grid, streams[a])
         others = [(one, places[view]) for view in range(len(places)) if view not in (a, b) for one in swapped]
-        before = now[a].sum(axis=0) + now[b].sum(axis=0) - now[a, b]
-        after = np.sum([_meetings(*two, len(frames)) for two in (swapped, *others)], axis=0)
-        gain, chance = float(after[0] - before[0]), _CERTAIN * float(after[1] + before[1]) ** 0.5
-        least = _MEETING_SHARE * sum(len(frame) for frame, _ in swapped)
-        if gain > chance and after[0] > max(_SWAP_GAIN * before[0], least, MIN_PEOPLE):
+        before, pairs = now[a].sum(axis=0) + now[b].sum(axis=0) - now[a, b], [swapped, *others]
+        met, people = sum(_meeting_count(*two, 0, len(frames)) for two in pairs), sum(len(one.frame) for one in swapped)
+        least = max(_SWAP_GAIN * before[0], _MEETING_SHARE * people, MIN_PEOPLE)
+        chance = _CERTAIN * float(met + before[1]) ** 0.5
+        if met - before[0] <= chance or met <= least:
+            continue  # whatever it is beyond chance
+        after = _beyond_chance(pairs, len(frames))[0]
+        gain = float(after - before[0])
+        if gain > chance and after > least:
             gains[a, b], best = gain, max(best, gain - chance)
     return tuple(sorted((pair for pair in gains if gains[pair] >= best), key=lambda pair: -gains[pair]))
 
@@ -90,20 +104,21 @@ def find_swapped_streams(rig: Rig, boxes_by_frame: BoxesByFrame) -> tuple[tuple[
 def _standing(camera: Camera, grid: Grid, boxes: Sequence[Floats]) -> Standing:
     """Where the people of a stream, boxes (n, 4) a frame, would stand if it were this camera's."""
     ground, _, box = candidates(camera, grid, np.concatenate(boxes))
-    return np.repeat(np.arange(len(boxes)), [len(part) for part in boxes])[box], ground
+    frame = np.repeat(np.arange(len(boxes)), [len(part) for part in boxes])[box]
+    return Standing(frame, ground, cKDTree(_apart(frame, ground)))
 
 
-def _meetings(one: Standing, other: Standing, frames: int) -> Floats:
+def _beyond_chance(pairs: Sequence[tuple[Standing, Standing]], frames: int) -> Floats:
     """Number of people near one of another view, less that at other times, and the number itself, float64 (2,)."""
-    partners = cKDTree(_apart(*other))
+    now, *others = (sum(_meeting_count(*two, int(lag * frames), frames) for two in pairs) for lag in (0.0, *_LAGS))
+    return np.array([now - np.mean(others), now])
 
-    def meeting_count(lag: float) -> int:
-        later = (one[0] + int(lag * frames)) % frames  # the recording begins anew at its end
-        away, _ = partners.query(_apart(later, one[1]), distance_upper_bound=_MEETING_DISTANCE)
-        return int(np.count_nonzero(away < _MEETING_DISTANCE))
 
-    now = meeting_count(0)
-    return np.array([now - np.mean([meeting_count(lag) for lag in _LAGS]), now])
+def _meeting_count(one: Standing, other: Standing, lag: int, frames: int) -> int:
+    """Number of people of one view who are near one of another view, as many frames later."""
+    later = (one.frame + lag) % frames  # the recording begins anew at its end
+    away, _ = other.tree.query(_apart(later, one.ground), distance_upper_bound=_MEETING_DISTANCE)
+    return int(np.count_nonzero(away < _MEETING_DISTANCE))
 
 
 def _apart(frame: Ints, ground: Floats) -> Floats:
