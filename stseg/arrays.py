@@ -32,6 +32,14 @@ def by_track(table: Rows) -> list[Rows]:
     return np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(table) else []
 
 
+def some_columns(table: Rows, dtype: np.dtype[np.void], order: Ints | None = None) -> Rows:
+    """A copy of the columns of a dtype, the rows in an order."""
+    rows = np.empty(len(table), dtype)
+    for name in dtype.names or ():
+        rows[name] = table[name] if order is None else table[name][order]
+    return rows
+
+
 def columns(text: str) -> np.dtype[np.void]:
     """Dtype of rows with such columns as in `"frame:<i8 score:<f4"`."""
     return np.dtype([(name, kind) for name, kind in (column.split(":") for column in text.split())])

@@ -13,6 +13,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
+from stseg.io.detections.packed_numbers import packed
 from stseg.io.detections.record import Detections
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numpy_files import read_npy
@@ -76,7 +77,8 @@ def read_boxes(
         raise FormatError(path, place, f"more than {limits.BOXES_PER_FRAME} boxes", "no more")
     length = int(frame.max()) + 1 if frames is None else frames
     features = None if appearance is None else read_features(appearance, len(values))[order]
-    return Detections(frame[order], values[order, 1:5], score[order], frames=length, features=features)
+    numbers = packed(values[order, 1:5]), packed(score[order])
+    return Detections(frame[order], *numbers, frames=length, features=features)
 
 
 def _check(lines: _Lines, first_frame: int, frames: int | None) -> None:

@@ -9,15 +9,16 @@ import json
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 
-from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.arrays import Boxes, Flags, Ints, Singles
 from stseg.errors import FormatError, SourceError, printable
 from stseg.io.detections.masks import Mask
+from stseg.io.detections.packed_numbers import Numbers, packed, rows_of
 from stseg.io.recording.recording import Source
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text, reading
@@ -47,9 +48,9 @@ class Detections:
 
     frame: Ints
     """int64 (n,): frame of each detection, as the source counts them."""
-    pixel: Floats
+    pixel: Numbers
     """float64 (n, 4): left, top, width, height in pixels."""
-    score: Floats
+    score: Numbers
     """float64 (n,): 0..1; 1 where the source gives none."""
     label: tuple[str, ...] = ()
     """Class of each detection: its name, or its number as text; empty where the source has no classes."""
@@ -71,13 +72,18 @@ class Detections:
         label = tuple(self.label[k] for k in index) if self.label else ()
         mask = tuple(self.mask[k] for k in index) if self.mask else ()
         features = None if self.features is None else self.features[index]
-        frame, pixel, score = self.frame[index], self.pixel[index], self.score[index]
-        return Detections(frame, pixel, score, label, mask, self.frames, features)
+        pixel, score = rows_of(self.pixel, index), rows_of(self.score, index)
+        return Detections(self.frame[index], pixel, score, label, mask, self.frames, features)
+
+    def packed(self) -> Detections:
+        """The same with packed numbers."""
+        return replace(self, pixel=packed(self.pixel), score=packed(self.score))
 
     def at(self, frame: int) -> Boxes:
         """The boxes of one frame, in the order of the rows; their frames must rise."""
         start, stop = np.searchsorted(self.frame, (frame, frame + 1))
-        return Boxes(self.pixel, self.score, self.features).of(slice(start, stop))
+        features = None if self.features is None else self.features[start:stop]
+        return Boxes(self.pixel[start:stop], self.score[start:stop], features)
 
     def classes(self) -> dict[str, int]:
         """Number of detections of each class, the most frequent first."""

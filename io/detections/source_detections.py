@@ -67,18 +67,21 @@ def _read(source: Source, size: tuple[int, int], _stamp_of_file: tuple[int, int]
         if source.classes:
             raise SourceError(source.path, "classes", ", ".join(source.classes), "detections that have classes")
         boxes = read_boxes(source.path, source.first_frame, source.frames, source.appearance)
-        found = replace(boxes, frame=boxes.frame + source.first_frame)
-        return SourceDetections("boxes as text", found, boxes.of(boxes.score >= source.least_score), boxes.frames or 0)
+        found = replace(boxes, frame=boxes.frame + source.first_frame) if source.first_frame else boxes
+        return SourceDetections(
+            "boxes as text", found, boxes.of(boxes.score[:] >= source.least_score), boxes.frames or 0
+        )
     name, found = recognised
     if source.appearance is not None:
         found = replace(found, features=read_features(source.appearance, len(found)))
+    found = found.packed()
     kept = found.of(_wanted(found, source.classes, source.least_score))
-    kept = replace(kept, frame=kept.frame - source.first_frame)
+    kept = replace(kept, frame=kept.frame - source.first_frame) if source.first_frame else kept
     return SourceDetections(name, found, kept, _length(source, found, kept))
 
 
 def _wanted(found: Detections, classes: Sequence[str], least_score: float) -> Flags:
-    wanted: Flags = np.asarray(found.score >= least_score)
+    wanted: Flags = np.asarray(found.score[:] >= least_score)
     if classes:
         lower = {name.lower() for name in classes}
         wanted &= np.array([label.lower() in lower for label in found.label] or [False] * len(found), bool)

@@ -28,6 +28,7 @@ from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
 from stseg.trackers.protocol import TrackingMethod
 from stseg.trajectories.final_tracks import (
+    AnyCommittedRows,
     CommittedRows,
     FinalTracks,
     box_rows,
@@ -91,8 +92,12 @@ class Pipeline:
         return appearance_rows(frame, explanation, tables, self.axes, observations, evidence, images)
 
     def finished(self, rows: CommittedRows, image_rig: Rig | None = None) -> tuple[Tracks, Ints]:
-        """The tracks of a whole run (`finished_tracks`), their boxes in this rig's pixels or those of another."""
-        return finished_tracks(self.rig, self.config, self.tracker, rows, self.rig if image_rig is None else image_rig)
+        """The tracks of a whole run, and the track id of each committed row.
+
+        Boxes are in this rig's pixels or those of another.
+        """
+        whole = finished_tracks(self.rig, self.config, self.tracker, rows)
+        return _with_boxes(whole, image_rig or self.rig, self.config.body.breadth), whole.identity
 
 
 def find_candidate_source(rig: Rig, kinds: Sequence[str], config: Config) -> CandidateSource | None:
@@ -108,23 +113,20 @@ def decides_by_appearance(tracker: type[TrackingMethod], config: Config) -> bool
     return not tracker.final and config.tracking.appearance != "none"
 
 
-def finished_tracks(
-    rig: Rig, config: Config, tracker: type[TrackingMethod], rows: CommittedRows, image_rig: Rig
-) -> tuple[Tracks, Ints]:
-    """The tracks of a whole run, and the track id of each committed row.
-
-    Rig, configuration and tracker are those that committed the rows; boxes are in the pixels of `image_rig`.
-    """
+def finished_tracks(rig: Rig, config: Config, tracker: type[TrackingMethod], rows: AnyCommittedRows) -> FinalTracks:
+    """The tracks of a whole run. Rig, configuration and tracker are those that committed the rows."""
     if not tracker.final:
-        return associated_tracks(rig, config, rows, image_rig)
-    whole = committed_tracks(rows.trajectory, rows.events, rig.frame_rate, config.tracking)
-    return _with_boxes(whole, image_rig, config.body.breadth), whole.identity
+        return final_tracks(rows, rig.frame_rate, Border.of(rig), config)
+    return committed_tracks(rows.trajectory, rows.events, rig.frame_rate, config.tracking)
 
 
 def associated_tracks(
     rig: Rig, config: Config, rows: CommittedRows, image_rig: Rig, constraints: Constraints = NO_CONSTRAINTS
 ) -> tuple[Tracks, Ints]:
-    """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
+    """The tracks of a whole run and the track id of each committed row, under constraints on these.
+
+    Boxes are in the pixels of `image_rig`; the identities of the run's tracker were not final.
+    """
     whole = final_tracks(rows, rig.frame_rate, Border.of(rig), config, constraints)
     return _with_boxes(whole, image_rig, config.body.breadth), whole.identity
 
@@ -137,6 +139,10 @@ def identity_problem(
     return IdentityProblem.of(bridged, sizes, appearance, rig.frame_rate, Border.of(rig), config, constraints)
 
 
+def box_tables(image_rig: Rig, breadth: float) -> list[BodyTable]:
+    """Of each view, for boxes in the pixels of its images."""
+    return [BodyTable.of(camera, image_rig.grid, breadth=breadth) for camera in image_rig.cameras]
+
+
 def _with_boxes(whole: FinalTracks, image_rig: Rig, breadth: float) -> Tracks:
-    tables = [BodyTable.of(camera, image_rig.grid, breadth=breadth) for camera in image_rig.cameras]
-    return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events)
+    return Tracks(whole.trajectory, box_rows(box_tables(image_rig, breadth), whole.trajectory), whole.events)

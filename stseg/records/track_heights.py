@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Floats, Rows, Singles
 from stseg.geometry.rig import BODY_HEIGHT
 
 
@@ -12,14 +12,22 @@ def median_measured(size: Floats) -> float:
     return float(np.median(finite)) if len(finite) else np.nan
 
 
-def with_heights(trajectory: Rows) -> Rows:
-    """A copy to draw bodies by: a row without a height has its track's median, or that of a standing person.
+def heights(trajectory: Rows) -> Singles:
+    """Height to draw the body of each row by, float32 (n,), metres.
 
-    `trajectory` is TRAJECTORY (n,), in any order.
+    A row without one has its track's median, or that of a standing person. `trajectory` is TRAJECTORY (n,), in any
+    order.
     """
-    rows, unknown = trajectory.copy(), ~np.isfinite(trajectory["height"])
-    order = np.argsort(rows["id"], kind="stable")
-    for of_track in np.split(order, np.flatnonzero(np.diff(rows["id"][order])) + 1):
+    tall, unknown = trajectory["height"].copy(), ~np.isfinite(trajectory["height"])
+    order = np.argsort(trajectory["id"], kind="stable")
+    for of_track in np.split(order, np.flatnonzero(np.diff(trajectory["id"][order])) + 1):
         height = median_measured(trajectory["height"][of_track])
-        rows["height"][of_track[unknown[of_track]]] = height if np.isfinite(height) else BODY_HEIGHT
+        tall[of_track[unknown[of_track]]] = height if np.isfinite(height) else BODY_HEIGHT
+    return tall
+
+
+def with_heights(trajectory: Rows) -> Rows:
+    """A copy to draw bodies by, in which every row has its height."""
+    rows = trajectory.copy()
+    rows["height"] = heights(trajectory)
     return rows

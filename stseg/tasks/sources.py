@@ -69,7 +69,7 @@ class SourceSummary:
     @property
     def boxes(self) -> Floats:
         """Left, top, width and height of all boxes, pixels, float64 (n, 4); none of a source of pixels."""
-        return np.zeros((0, 4)) if self.detections is None else self.detections.kept.pixel
+        return np.zeros((0, 4)) if self.detections is None else self.detections.kept.pixel[:]
 
     def boxes_at(self, frame: int) -> Floats:
         """Edges of the boxes in a frame of the recording, float64 (n, 4), see `isolated_boxes`."""
@@ -88,7 +88,7 @@ class SourceSummary:
             str(len(pixel)),
             f"{len(pixel) / max(found.frames, 1):.1f}",
             _span(pixel[:, 3], "{:.0f}"),
-            _span(found.kept.score, "{:.2f}"),
+            _span(found.kept.score[:], "{:.2f}"),
             f"{100 * self.ground()[1].mean():.0f} %" if len(pixel) else "",
             ", ".join(f"{name} {count}" for name, count in list(found.read.classes().items())[:5]),
         )

@@ -37,14 +37,14 @@ class SegmentTracks:
 
 @dataclass(frozen=True)
 class StitchedTracks:
-    """The tracks of all segments, under names of the run."""
+    """The tracks of one segment, under names of the run."""
 
     committed: Rows
-    """TRAJECTORY (n,)."""
-    local: Ints
-    """int64 (n,): name of each row in its segment."""
+    """TRAJECTORY (n,): without its warm-up."""
     events: Rows
-    """EVENT (m,)."""
+    """EVENT (m,): with those of the boundary before it."""
+    names: Ints
+    """int64 (track,): the run's name of each, by its name in the segment."""
 
 
 class Stitcher:
@@ -52,10 +52,10 @@ class Stitcher:
 
     def __init__(self, patience: int = 0) -> None:
         self.issued, self.patience = 0, patience
-        self._joined: list[StitchedTracks] = []
+        self._latest: list[StitchedTracks] = []
 
-    def add(self, part: SegmentTracks) -> None:
-        """Append the next segment."""
+    def add(self, part: SegmentTracks) -> StitchedTracks:
+        """Stitch the next segment to those before."""
         lead = part.trajectory[part.trajectory["frame"] < part.first]
         rows = part.trajectory[part.trajectory["frame"] >= part.first]
         local = np.unique(np.concatenate([rows["id"], part.events["id"], part.events["other"]]))
@@ -82,29 +82,22 @@ class Stitcher:
         if part.gap:
             added += self._ended(part)
         events = np.concatenate([events, np.array(added, EVENT)])
-        self._joined.append(
-            StitchedTracks(committed, rows["id"].copy(), events[np.argsort(events["frame"], kind="stable")])
-        )
-
-    def joined(self) -> StitchedTracks:
-        """The segments so far, which this keeps as one."""
-        parts = self._joined or [StitchedTracks(np.zeros(0, TRAJECTORY), np.zeros(0, np.int64), np.zeros(0, EVENT))]
-        joined = (np.concatenate([getattr(p, name) for p in parts]) for name in ("committed", "local", "events"))
-        self._joined = [StitchedTracks(*joined)]
-        return self._joined[0]
+        stitched = StitchedTracks(committed, events[np.argsort(events["frame"], kind="stable")], names)
+        self._latest = [*self._latest[-1:], stitched]
+        return stitched
 
     def _tail(self, lead: Rows) -> Rows:
         """Rows of the earlier segments in the frames of a warm-up."""
-        if not self._joined or not len(lead):
+        if not self._latest or not len(lead):
             return np.zeros(0, TRAJECTORY)
-        rows = self._joined[-1].committed
+        rows = self._latest[-1].committed
         return np.asarray(rows[rows["frame"] >= lead["frame"].min()])
 
     def _ended(self, part: SegmentTracks) -> list[_EventRow]:
         """Deaths of the tracks that were alive when the gap before a segment began."""
-        rows = np.concatenate([one.committed for one in self._joined[-2:]] or [part.trajectory[:0]])
+        rows = np.concatenate([one.committed for one in self._latest] or [part.trajectory[:0]])
         alive = rows[rows["frame"] >= part.first - part.gap - self.patience - 1]
-        events = np.concatenate([one.events for one in self._joined[-2:]] or [part.events[:0]])
+        events = np.concatenate([one.events for one in self._latest] or [part.events[:0]])
         reason = f"gap: no camera has any of the {part.gap} frames before frame {part.first}"
         return _deaths(alive, _dead(events), reason)
 
@@ -112,7 +105,7 @@ class Stitcher:
         """Deaths at the boundary: tracks that no track of the segment continues and that have no death event yet."""
         if not len(before):
             return []
-        over = living | _dead(self._joined[-1].events)
+        over = living | _dead(self._latest[-1].events)
         return _deaths(before, over, "not found again where a segment ends")
 
 

@@ -10,13 +10,13 @@ Global association moves no place: it decides which rows belong to one person, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from stseg.arrays import Ints, Rows
+from stseg.arrays import Floats, Ints, Rows, columns, some_columns
 from stseg.bodies.pillars import BodyTable
 from stseg.config import Config, TrackingConfig
 from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem, Link, associate_globally
@@ -26,15 +26,33 @@ from stseg.identities.review.weighed_doubts import doubt_events
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
 from stseg.records.tables import BOX, EVENT
-from stseg.records.track_heights import with_heights
+from stseg.records.track_heights import heights
 from stseg.tracking.windows.encounters import encounters
 from stseg.trajectories.pruning import drop_short
 from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
 from stseg.trajectories.smoother import fill_gaps, interpolated_rows, smooth_places
 
+_PLACED = columns("frame:<i8 id:<i8 x:<f8 y:<f8")
+"""Columns of the rows of the problem that are still asked for once there are tracks."""
+_ROWS_AT_ONCE = 8192
+"""Rows of a trajectory whose boxes are made at a time."""
+
+
+class AnyCommittedRows(Protocol):
+    """Rows of a whole run as its tracker committed them, see `CommittedRows`; the trajectory is asked for once."""
+
+    @property
+    def trajectory(self) -> Rows: ...
+    @property
+    def events(self) -> Rows: ...
+    @property
+    def appearance(self) -> Rows: ...
+    @property
+    def known_people(self) -> Rows: ...
+
 
 class CommittedRows(NamedTuple):
-    """Rows of a whole run as its tracker committed them."""
+    """The same in memory."""
 
     trajectory: Rows
     """TRAJECTORY (n,)."""
@@ -59,32 +77,33 @@ class FinalTracks:
 
 
 def final_tracks(
-    rows: CommittedRows, frame_rate: float, border: Border, config: Config, constraints: Constraints = NO_CONSTRAINTS
+    rows: AnyCommittedRows, frame_rate: float, border: Border, config: Config, constraints: Constraints = NO_CONSTRAINTS
 ) -> FinalTracks:
     """The tracks of a run from its committed rows, under constraints on those of the trajectory.
 
     People of earlier recordings keep their ids; all others have greater ones.
     """
-    committed = rows.trajectory
-    bridged, sizes = bridged_rows(committed, frame_rate, config)
+    bridged, track, sizes = _bridged(rows.trajectory, frame_rate, config)
     problem = IdentityProblem.of(bridged, sizes, rows.appearance, frame_rate, border, config, constraints)
     linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
-    named = linked.identity[: len(committed)]
-    kept, dropped = drop_short(bridged[: len(committed)], frame_rate, config.tracking)
+    committed, named = bridged[: len(track)], linked.identity[: len(track)]
+    kept, dropped = drop_short(committed, frame_rate, config.tracking)
     identity = np.where(np.isin(named, kept), named, 0)
-    met = _encounters(rows.events, _Names(committed, identity), frame_rate, config.tracking)
-    renamed = _renamed(rows.events, _Names(committed, named), linked.links)
-    tracks = fill_gaps(bridged[np.isin(bridged["id"], kept)], frame_rate, config.tracking, True)
+    met = _encounters(rows.events, _Names(track, committed["frame"], identity), frame_rate, config.tracking)
+    renamed = _renamed(rows.events, _Names(track, committed["frame"], named), linked.links)
+    tracks, bridged = bridged[np.isin(bridged["id"], kept)], some_columns(bridged, _PLACED)
+    del committed
+    tracks = fill_gaps(tracks, frame_rate, config.tracking, True)
     smooth_places(tracks, frame_rate, config.motion)
-    doubts = doubt_events(tracks, bridged[: len(committed)], problem, constraints)
+    doubts = doubt_events(tracks, bridged[: len(track)], problem, constraints)
     every_event = np.concatenate([renamed, met, dropped, doubts])
     whole = FinalTracks(tracks, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
     least = config.tracking.return_probability
     if least == 1:
         return whole
     whole = _with_later_ids(whole, int(rows.known_people["id"].max(initial=0)))
-    returns = returns_of(problem, whole.identity, bridged, least, constraints, rows.known_people)
+    returns = returns_of(problem, whole.identity, bridged["frame"], least, constraints, rows.known_people)
     return _with_returns(whole, returns, frame_rate)
 
 
@@ -102,6 +121,12 @@ def _with_returns(whole: FinalTracks, returns: Sequence[Return], frame_rate: flo
     trajectory = renamed_trajectory(whole.trajectory, returns)
     events = renamed_events(whole.events, trajectory, returns, frame_rate)
     return FinalTracks(trajectory, events, renamed_ids(whole.identity, returns))
+
+
+def _bridged(committed: Rows, frame_rate: float, config: Config) -> tuple[Rows, Ints, MeasuredSizes]:
+    """As `bridged_rows`, with the track of each committed row."""
+    bridged, sizes = bridged_rows(committed, frame_rate, config)
+    return bridged, committed["id"].copy(), sizes
 
 
 def bridged_rows(committed: Rows, frame_rate: float, config: Config) -> tuple[Rows, MeasuredSizes]:
@@ -156,13 +181,13 @@ def _encounters(events: Rows, name_at: _Names, frame_rate: float, config: Tracki
 class _Names:
     """The identity of a track in each frame, and the first and last frame of each identity."""
 
-    def __init__(self, committed: Rows, identity: Ints) -> None:
-        order = np.lexsort((committed["frame"], committed["id"]))
-        self.track, self.frame, self.identity = committed["id"][order], committed["frame"][order], identity[order]
+    def __init__(self, track: Ints, frame: Ints, identity: Ints) -> None:
+        order = np.lexsort((frame, track))
+        self.track, self.frame, self.identity = track[order], frame[order], identity[order]
         names, where = np.unique(identity, return_inverse=True)
         since, until = np.full(len(names), np.iinfo(np.int64).max), np.full(len(names), -1)
-        np.minimum.at(since, where, committed["frame"])
-        np.maximum.at(until, where, committed["frame"])
+        np.minimum.at(since, where, frame)
+        np.maximum.at(until, where, frame)
         self.ends = [dict(zip(names.tolist(), frames.tolist(), strict=True)) for frames in (since, until)]
 
     def name(self, track: int, frame: int) -> int:
@@ -179,7 +204,19 @@ def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:
 
     A row without a height has its track's. The rows are in the order of the trajectory, then of the views.
     """
-    ground, tall = np.column_stack([trajectory["x"], trajectory["y"]]), with_heights(trajectory)["height"].astype(float)
+    return np.concatenate([np.zeros(0, BOX), *box_parts(tables, trajectory)])
+
+
+def box_parts(tables: Sequence[BodyTable], trajectory: Rows) -> Iterator[Rows]:
+    """The same in parts: those of a day take more memory than its trajectory."""
+    tall = heights(trajectory)
+    for start in range(0, len(trajectory), _ROWS_AT_ONCE):
+        part = slice(start, start + _ROWS_AT_ONCE)
+        yield _boxes_of(tables, trajectory[part], tall[part].astype(float))
+
+
+def _boxes_of(tables: Sequence[BodyTable], trajectory: Rows, tall: Floats) -> Rows:
+    ground = np.column_stack([trajectory["x"], trajectory["y"]])
     every_box = np.zeros((len(trajectory), len(tables)), BOX)
     visible = np.zeros(every_box.shape, bool)
     for view, table in enumerate(tables):

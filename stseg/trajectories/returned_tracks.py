@@ -12,7 +12,7 @@ from stseg.records.tables import EVENT
 
 
 def returns_of(
-    problem: IdentityProblem, identity: Ints, bridged: Rows, least: float, constraints: Constraints, known_people: Rows
+    problem: IdentityProblem, identity: Ints, frame: Ints, least: float, constraints: Constraints, known_people: Rows
 ) -> list[Return]:
     """Visits that are one person's with an earlier one.
 
@@ -21,9 +21,9 @@ def returns_of(
     problem
         By which identities were decided.
     identity : int64 (n,)
-        Of each committed row, 0 for none: the first of those in `bridged`.
-    bridged : TRAJECTORY (n + m,)
-        All rows of the problem.
+        Of each committed row, 0 for none: the first of those of the problem.
+    frame : int64 (n + m,)
+        Of each row of the problem.
     least
         Least probability.
     constraints
@@ -31,7 +31,7 @@ def returns_of(
     known_people : KNOWN_PERSON (k,)
         People of earlier recordings; no other person has their ids.
     """
-    visits = problem.visits(np.pad(identity, (0, len(bridged) - len(identity))), bridged["frame"], known_people)
+    visits = problem.visits(np.pad(identity, (0, len(frame) - len(identity))), frame, known_people)
     two = [identity[rows[~constraints.same]] for rows in (constraints.earlier, constraints.later)]
     return find_returns(visits, problem.model.spread, least, np.column_stack(two))
 

@@ -10,7 +10,7 @@ error allows, however many rows there are. All tracks are smoothed at the same t
 second rows, and so on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -33,8 +33,12 @@ _DRIFT_PER_FRAME = 0.1
 def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig, keep_apart: bool = False) -> Rows:
     """The trajectory with its interpolated rows, or those apart from all others, sorted by frame, then id."""
     filled = interpolated_rows(trajectory, frame_rate, config)
-    rows = np.concatenate([trajectory, _apart_from(filled, trajectory) if keep_apart else filled])
-    return np.asarray(rows[np.lexsort((rows["id"], rows["frame"]))])
+    parts = trajectory, _apart_from(filled, trajectory) if keep_apart else filled
+    order = np.lexsort([np.concatenate([part[name] for part in parts]) for name in ("id", "frame")])
+    place, rows = np.empty_like(order), np.empty(len(order), TRAJECTORY)
+    place[order] = np.arange(len(order))
+    rows[place[: len(trajectory)]], rows[place[len(trajectory) :]] = parts
+    return rows
 
 
 def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
@@ -53,11 +57,11 @@ def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfi
 def _apart_from(rows: Rows, trajectory: Rows) -> Rows:
     """Rows apart from all rows of the trajectory in the same frame: two bodies need two places."""
     free = np.ones(len(rows), bool)
-    by_frame = trajectory[np.argsort(trajectory["frame"], kind="stable")]
-    order = np.argsort(rows["frame"], kind="stable")
+    by_frame = np.argsort(trajectory["frame"], kind="stable")
+    frame, order = trajectory["frame"][by_frame], np.argsort(rows["frame"], kind="stable")
     for of_frame in np.split(order, np.flatnonzero(np.diff(rows["frame"][order])) + 1) if len(rows) else ():
-        first, stop = np.searchsorted(by_frame["frame"], rows["frame"][of_frame[0]] + np.arange(2))
-        away = distances(_ground(rows[of_frame]), _ground(by_frame[first:stop]))
+        first, stop = np.searchsorted(frame, rows["frame"][of_frame[0]] + np.arange(2))
+        away = distances(_ground(rows[of_frame]), _ground(trajectory[by_frame[first:stop]]))
         free[of_frame] = (away >= EXCLUSION_RADIUS).all(axis=1)
     return np.asarray(rows[free])
 
@@ -88,12 +92,16 @@ def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> N
     """
     if not len(trajectory):
         return
-    places = np.column_stack([trajectory["raw_x"], trajectory["raw_y"]])
-    noise = np.array([[trajectory["xx"], trajectory["xy"]], [trajectory["xy"], trajectory["yy"]]]).transpose(2, 0, 1)
-    tracks = rows_of_tracks(trajectory["id"])
-    ground, covariance = smoothed_paths(trajectory["frame"] / frame_rate, places, noise, tracks, model)
-    trajectory["x"], trajectory["y"] = ground.T
-    trajectory["xx"], trajectory["xy"], trajectory["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+
+    def measured(index: Ints) -> _Measured:
+        rows = trajectory[index]
+        noise = np.array([[rows["xx"], rows["xy"]], [rows["xy"], rows["yy"]]]).transpose(2, 0, 1)
+        return rows["frame"] / frame_rate, np.column_stack([rows["raw_x"], rows["raw_y"]]), noise
+
+    for rows, ground, covariance in _smoothed_parts(measured, rows_of_tracks(trajectory["id"]), model):
+        trajectory["x"][rows], trajectory["y"][rows] = ground.T
+        for name, value in zip(("xx", "xy", "yy"), covariance.reshape(-1, 4)[:, [0, 1, 3]].T, strict=True):
+            trajectory[name][rows] = value
 
 
 def smoothed_paths(
@@ -117,22 +125,39 @@ def smoothed_paths(
     float64 (n, 2), float64 (n, 2, 2)
         Smoothed places and their covariances.
     """
+    places, covariance = np.empty(ground.shape), np.empty(noise.shape)
+    for rows, *found in _smoothed_parts(lambda rows: (seconds[rows], ground[rows], noise[rows]), tracks, model):
+        places[rows], covariance[rows] = found
+    return places, covariance
+
+
+_Measured = tuple[Floats, Floats, Floats]
+"""Seconds (n,), places (n, 2) and their covariances (n, 2, 2) of some rows."""
+
+
+def _smoothed_parts(
+    measured: Callable[[Ints], _Measured], tracks: Sequence[Ints], model: MotionConfig
+) -> Iterator[tuple[Ints, Floats, Floats]]:
+    """Rows of each part, the last first, with their smoothed places and covariances.
+
+    What was `measured` in a row is no longer asked for once it is smoothed.
+    """
     order, number = _by_turn(tracks)
     parts, begun = _parts(number), list[_States | None]([None])
 
     def filtered(k: int) -> _Filtered:
-        turns, rows = parts[k][0], order[parts[k][1]]
-        return _filtered(seconds[rows], ground[rows][:, :, None], noise[rows], number[turns], begun[k], model)
+        seconds, ground, noise = measured(order[parts[k][1]])
+        return _filtered(seconds, ground[:, :, None], noise, number[parts[k][0]], begun[k], model)
 
     for k, (turns, _) in enumerate(parts[:-1]):
         (state, spread), *_ = filtered(k)
         begun.append((state[-number[turns][-1] :].copy(), spread[-number[turns][-1] :].copy()))
-    places, covariance, after = np.empty((len(order), 2)), np.empty((len(order), 2, 2)), None
+    after = None
     for k, (turns, rows) in reversed(list(enumerate(parts))):
         state, spread = _smoothed(filtered(k), number[turns], after)
-        after = state[: number[turns][0]], spread[: number[turns][0]]
-        places[order[rows]], covariance[order[rows]] = state[:, :2, 0], spread[:, :2, :2]
-    return places, covariance
+        first = int(number[turns][0])
+        after, own = (state[:first], spread[:first]), slice(first if k else 0, None)  # the part before has the others
+        yield order[rows][own], state[own, :2, 0], spread[own, :2, :2]
 
 
 _States = tuple[Floats, Floats]

@@ -79,7 +79,7 @@ def test_real_detections(name: str, frames: int, boxes: int) -> None:
     path = data_path(f"cmc/DET_{name}.txt")
     table = read_boxes(path, first_frame=1)
     assert table.frames == frames and sum(len(table.at(frame)) for frame in range(frames)) == boxes
-    assert set(table.score) == {1.0}
+    assert set(table.score[:]) == {1.0}
 
 
 def blob(seed: int) -> Bytes:
@@ -206,13 +206,13 @@ def test_classes_flags_and_scores_choose(tmp_path: Path) -> None:
 
 def test_results_of_pycocotools_without_scores_and_outlines(tmp_path: Path) -> None:
     (tmp_path / "v_0.txt").write_text("0 0.5 0.5 0.1 0.2 1\n0 0.2 0.5 0.1 0.2 2\n")
-    assert read_source(Source("boxes", tmp_path), SIZE).kept.score.tolist() == [1, 1]
+    assert read_source(Source("boxes", tmp_path), SIZE).kept.score[:].tolist() == [1, 1]
     (tmp_path / "v_0.txt").write_text(f"0 0.5 0.5 0.1 0.2 {'0.3 0.4 0.9 ' * 17} 0.75\n")
     found = read_source(Source("boxes", tmp_path), SIZE)
-    assert found.kept.score.tolist() == [0.75] and not found.kept.mask
+    assert found.kept.score[:].tolist() == [0.75] and not found.kept.mask
     path, masks = coco_results(tmp_path)
     found = read_source(Source("instances", path), SIZE)
-    assert (found.format, found.frames, found.kept.score.tolist()) == ("COCO results", 3, [0.5, 0.6, 0.7])
+    assert (found.format, found.frames, found.kept.score[:].tolist()) == ("COCO results", 3, [0.5, 0.6, 0.7])
     for frame, mask in enumerate(masks):
         np.testing.assert_array_equal(instance_image(found.kept, [frame], SIZE), mask)
 

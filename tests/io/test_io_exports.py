@@ -203,7 +203,7 @@ def test_mot_boxes_are_one_file_a_camera_that_reads_as_boxes(run: Run, path: Pat
         assert archive.read("left.txt").decode() == "11,1,1.00,2.00,3.00,4.00,1,-1,-1,-1\n"
         assert archive.read("right.txt") == b""
         boxes = read_boxes(Path(archive.extract("left.txt", path.parent)), first_frame=1)
-    assert (boxes.frame.tolist(), boxes.pixel.tolist()) == ([10], [[1.0, 2.0, 3.0, 4.0]])
+    assert (boxes.frame.tolist(), boxes.pixel[:].tolist()) == ([10], [[1.0, 2.0, 3.0, 4.0]])
 
 
 @pytest.mark.parametrize(("name", "of_camera"), [("coco", ""), ("cvat", "{}.xml"), ("label-studio", "{}.json")])
@@ -225,7 +225,7 @@ def test_mended_annotations_come_back_as_boxes(run: Run, path: Path, name: str, 
         table = read_source(Source("boxes", file, select="" if of_camera else f"{camera.name}/*"), camera.size).table
         rows = boxes[boxes["view"] == view]
         np.testing.assert_array_equal(table.frame + first, rows["frame"])
-        np.testing.assert_allclose(table.pixel, [[row[edge] for edge in EDGES] for row in rows], atol=0.01)
+        np.testing.assert_allclose(table.pixel[:], [[row[edge] for edge in EDGES] for row in rows], atol=0.01)
 
 
 def wildtrack_files(path: Path) -> tuple[dict[str, Any], dict[int, list[dict[str, Any]]]]:

@@ -11,7 +11,7 @@ from stseg.config import Config, SegmentConfig, TrackingConfig
 from stseg.engine.offline.segments import segments
 from stseg.records.tables import TRAJECTORY
 from stseg.trackers.rows import event_rows
-from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, renamed_labels
+from stseg.tracking.segment_stitching import SegmentTracks, Stitcher, renamed_labels
 from stseg.tracking.windows.windows import windows
 
 
@@ -23,12 +23,13 @@ def events(*rows: tuple[int, str, int, int]) -> Rows:
     return event_rows([(*row, "reason") for row in rows])
 
 
-def stitched(*segments: tuple[Rows, Rows]) -> StitchedTracks:
-    """Rows and events of segments of twenty frames, joined."""
+def stitched(*segments: tuple[Rows, Rows]) -> tuple[Rows, Rows]:
+    """Rows and events of segments of twenty frames, under names of the run."""
     stitcher = Stitcher()
-    for number, (rows, told) in enumerate(segments):
-        stitcher.add(SegmentTracks(20 * number, rows, told))
-    return stitcher.joined()
+    found = [stitcher.add(SegmentTracks(20 * k, rows, told)) for k, (rows, told) in enumerate(segments)]
+    for one, (rows, _), first in zip(found, segments, range(0, 99, 20), strict=False):
+        assert one.committed["id"].tolist() == one.names[rows["id"][rows["frame"] >= first]].tolist()
+    return np.concatenate([one.committed for one in found]), np.concatenate([one.events for one in found])
 
 
 @drawn(60, st.floats(1.0, 30.0), st.integers(0, 500), st.integers(1, 3000), st.floats(1.0, 60.0), st.integers(0, 10)
@@ -66,17 +67,16 @@ def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> 
 def test_tracks_keep_names_over_seams_and_of_the_longest() -> None:
     first = np.concatenate([standing(1, range(20), 0.0), standing(2, range(20), 4.0)])
     later = np.concatenate([standing(1, range(15, 40), 4.1), standing(2, range(15, 40), 0.1)])
-    joined = stitched((first, events((0, "birth", 1, 0))), (later, events((25, "merge", 1, 2))))
-    assert joined.committed["frame"].tolist() == [*range(20), *range(20), *range(20, 40), *range(20, 40)]
-    assert joined.committed["id"].tolist() == [1] * 20 + [2] * 20 + [2] * 20 + [1] * 20
-    assert joined.local.tolist() == [1] * 20 + [2] * 20 + [1] * 20 + [2] * 20
-    assert joined.events[["frame", "kind", "id", "other"]].tolist() == [(0, b"birth", 1, 0), (25, b"merge", 2, 1)]
+    rows, told = stitched((first, events((0, "birth", 1, 0))), (later, events((25, "merge", 1, 2))))
+    assert rows["frame"].tolist() == [*range(20), *range(20), *range(20, 40), *range(20, 40)]
+    assert rows["id"].tolist() == [1] * 20 + [2] * 20 + [2] * 20 + [1] * 20
+    assert told[["frame", "kind", "id", "other"]].tolist() == [(0, b"birth", 1, 0), (25, b"merge", 2, 1)]
     later = np.concatenate([standing(1, range(15, 40), 0.0), standing(2, range(15, 19), 5.0)])
-    joined = stitched((standing(1, range(20), 0.0), events()), (later, events()))
-    assert np.unique(joined.committed["id"]).tolist() == [1] and len(joined.events) == 0
+    rows, told = stitched((standing(1, range(20), 0.0), events()), (later, events()))
+    assert np.unique(rows["id"]).tolist() == [1] and len(told) == 0
     both = np.concatenate([standing(1, range(17, 40), 0.2), standing(2, range(10, 40), -0.2)])
-    joined = stitched((standing(1, range(20), 0.0), events()), (both, events()))
-    assert joined.committed["id"][joined.local == 2].tolist()[-1] == 1
+    rows, _ = stitched((standing(1, range(20), 0.0), events()), (both, events()))
+    assert rows["id"][-1] == 1
 
 
 @pytest.mark.parametrize(
@@ -93,9 +93,9 @@ def test_tracks_keep_names_over_seams_and_of_the_longest() -> None:
     ids=["unclaimed", "told"],
 )
 def test_seams_of_unclaimed_tracks(first: tuple[Rows, Rows], later: tuple[Rows, Rows], told: tuple[int, int]) -> None:
-    joined = stitched(first, later)
-    assert np.unique(joined.committed["id"]).tolist() == [1, 2]
-    assert [(e["frame"], e["kind"], e["id"]) for e in joined.events] == [(told[0], b"death", 1), (told[1], b"birth", 2)]
+    rows, events_told = stitched(first, later)
+    assert np.unique(rows["id"]).tolist() == [1, 2]
+    assert [(e["frame"], e["kind"], e["id"]) for e in events_told] == [(told[0], b"death", 1), (told[1], b"birth", 2)]
 
 
 @drawn(

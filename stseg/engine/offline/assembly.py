@@ -3,25 +3,26 @@
 import os
 from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Ints
+from stseg.arrays import Ints, Rows
 from stseg.engine.offline.calls import Caller, called_here
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
-from stseg.engine.pipeline import finished_tracks
+from stseg.engine.pipeline import box_tables, finished_tracks
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
 from stseg.io.runfile.runs import Run, RunWriter, read_run
-from stseg.records.tables import APPEARANCE, Tracks
+from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks
 from stseg.trackers import find_tracker
-from stseg.tracking.segment_stitching import SegmentTracks, StitchedTracks, Stitcher, renamed_labels
-from stseg.trajectories.final_tracks import CommittedRows
+from stseg.tracking.segment_stitching import SegmentTracks, Stitcher, renamed_labels
+from stseg.trajectories.final_tracks import FinalTracks, box_parts
 
 _BLOCK = 64
 """Frames of the volume read at a time."""
@@ -36,10 +37,63 @@ class FinishedSegment(NamedTuple):
     path: Path
 
 
-def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: Caller = called_here) -> Tracks:
+@dataclass(frozen=True)
+class _StitchedSegment:
+    """A finished segment, and the names of its tracks in the run."""
+
+    first: int
+    path: Path
+    names: Ints
+    """int64 (track,): by the name in the segment."""
+    length: int
+    """Number of its rows."""
+
+    def read(self) -> Rows:
+        """TRAJECTORY (n,): the rows that it commits, under its own names."""
+        rows = read_run(self.path).trajectory
+        return np.asarray(rows[rows["frame"] >= self.first])
+
+    def committed(self) -> Rows:
+        """The same under names of the run."""
+        rows = self.read()
+        rows["id"] = self.names[rows["id"]]
+        return rows
+
+
+@dataclass(frozen=True)
+class _StitchedRun:
+    """Rows of a run as its tracker committed them; the trajectory is read where it is asked for, and not kept."""
+
+    segments: list[_StitchedSegment]
+    events: Rows
+    """EVENT (k,)."""
+    appearance: Rows
+    """APPEARANCE (l,)."""
+    known_people: Rows
+    """KNOWN_PERSON (m,)."""
+
+    @property
+    def trajectory(self) -> Rows:
+        """TRAJECTORY (n,), segment by segment."""
+        rows, start = np.empty(sum(part.length for part in self.segments), TRAJECTORY), 0
+        for part in self.segments:
+            rows[start : start + part.length] = part.committed()
+            start += part.length
+        return rows
+
+
+class _Association(NamedTuple):
+    """What association finds: the segments, the events before it, and the tracks."""
+
+    segments: list[_StitchedSegment]
+    events: Rows
+    tracks: FinalTracks
+
+
+def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: Caller = called_here) -> None:
     """Write the run file of a job from its finished segments.
 
-    What takes no track ids is copied while the tracks are associated.
+    What takes no track ids is copied while the tracks are associated. Rows are read and written part by part.
 
     Parameters
     ----------
@@ -51,11 +105,6 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
         Path of the run file; an existing file is replaced.
     call
         How the tracks are associated, see `stseg.engine.offline.calls`.
-
-    Returns
-    -------
-    Tracks
-        The tracks of the whole run.
     """
     views = read_run(finished[0].path).views
     config, recording = format_config(job.config), with_alignment(job.recording, job.streams.frame_at_tick)
@@ -65,39 +114,45 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
     ):
         for _, path in finished:
             _copy(read_run(path), writer)
-        joined, tracks, identity = association()
-        order = np.argsort(joined.committed["frame"], kind="stable")
-        frame, names, ids = joined.committed["frame"][order], joined.local[order], identity[order]
-        with ThreadPoolExecutor(os.cpu_count()) as packers:
-            for segment, path in finished:
-                here = slice(*frame.searchsorted([segment.first, segment.stop]))
-                _append_labels(read_run(path), frame[here], names[here], ids[here], writer, packers)
+        segments, events, tracks = association()
+        _append_segments(job, segments, tracks.identity, writer)
         writer.append("trajectory", tracks.trajectory)
         if not find_tracker(job.tracker).final:
-            writer.append("committed", joined.committed)
-            writer.append("committed_events", joined.events)
+            writer.append("committed_events", events)
             writer.append("known_people", job.known)
-        writer.append("boxes", tracks.boxes)
+        for boxes in box_parts(box_tables(job.recording.rig, job.config.body.breadth), tracks.trajectory):
+            writer.append("boxes", boxes)
         writer.append("events", tracks.events)
-        writer.finish(tracks.summary())
-    return tracks
+        writer.finish(Tracks(tracks.trajectory).summary())
 
 
-def _associated(job: Job, finished: Sequence[FinishedSegment]) -> tuple[StitchedTracks, Tracks, Ints]:
-    """Tracks of all segments under names of the run, tracks of the run, and the id of each joined row, 0 for none."""
+def _associated(job: Job, finished: Sequence[FinishedSegment]) -> _Association:
     stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = finished[0].segment.first if finished else 0
-    appearance = [np.zeros(0, APPEARANCE)]
+    segments, events, appearance = list[_StitchedSegment](), [np.zeros(0, EVENT)], [np.zeros(0, APPEARANCE)]
     for segment, path in finished:
         run = read_run(path)
-        stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
+        found = stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
+        segments.append(_StitchedSegment(segment.first, path, found.names, len(found.committed)))
+        events.append(found.events)
         appearance.append(run.appearance)
-    joined = stitcher.joined()
-    rows = CommittedRows(joined.committed, joined.events, np.concatenate(appearance), job.known)
-    tracker = find_tracker(job.tracker)
-    tracks, identity = finished_tracks(job.read.reduced_rig, job.config, tracker, rows, job.recording.rig)
-    return joined, tracks, identity
+    rows = _StitchedRun(segments, np.concatenate(events), np.concatenate(appearance), job.known)
+    tracks = finished_tracks(job.read.reduced_rig, job.config, find_tracker(job.tracker), rows)
+    return _Association(segments, rows.events, tracks)
+
+
+def _append_segments(job: Job, segments: Sequence[_StitchedSegment], identity: Ints, writer: RunWriter) -> None:
+    """Append the rows and the labels of all segments; of each row is its id in the run, int64 (n,), 0 for none."""
+    start, is_final = 0, find_tracker(job.tracker).final
+    with ThreadPoolExecutor(os.cpu_count()) as packers:
+        for part in segments:
+            rows, ids = part.read(), identity[start : start + part.length]
+            start += part.length
+            order = np.argsort(rows["frame"], kind="stable")
+            _append_labels(read_run(part.path), rows["frame"][order], rows["id"][order], ids[order], writer, packers)
+            if not is_final:
+                writer.append("committed", part.committed())
 
 
 def _copy(run: Run, writer: RunWriter) -> None:

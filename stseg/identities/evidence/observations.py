@@ -90,33 +90,33 @@ def observe(
     is in frames per second; people come and go at the border; `config` holds the constants of all stages.
     """
     order = np.lexsort((trajectory["id"], trajectory["frame"]))
-    rows = trajectory[order]
-    frames, start = np.unique(rows["frame"], return_index=True)
-    ground = np.column_stack([rows["x"], rows["y"]])
+    frame, track = trajectory["frame"][order], trajectory["id"][order]
+    frames, start = np.unique(frame, return_index=True)
+    ground = np.column_stack([trajectory["x"][order], trajectory["y"][order]])
     precision, information = model.evidence(sizes[order])
-    previous, alike = _previous(rows), PLACE_ERROR.row_variance(frame_rate)
-    variance = np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2)
-    inside = border.inside(ground, config.detection.border_width)
-    places = ground, variance, previous, _certain(rows, previous), inside
-    observed = ObservedRows(*places, precision, information, _signs(len(rows)))
-    return Observations(order, np.append(start, len(rows)), frames / frame_rate, observed)
+    alike = PLACE_ERROR.row_variance(frame_rate)
+    variance = np.maximum(alike * (trajectory["xx"] + trajectory["yy"])[order] / 2, _LEAST_PLACE_ERROR**2)
+    previous, inside = _previous(frame, track), border.inside(ground, config.detection.border_width)
+    alone = np.ones(len(order), bool)
+    alone[near_rows(trajectory, EXCHANGE_DISTANCE)[0]] = False
+    places = ground, variance, previous, _certain(frame, previous, alone[order]), inside
+    observed = ObservedRows(*places, precision, information, _signs(len(order)))
+    return Observations(order, np.append(start, len(order)), frames / frame_rate, observed)
 
 
 def _signs(number: int) -> Ints:
     return np.random.default_rng(0).integers(1 << 61, size=number) * 2 + 1
 
 
-def _previous(rows: Rows) -> Ints:
-    by_track = np.lexsort((rows["frame"], rows["id"]))
-    previous = np.full(len(rows), -1)
-    same = np.diff(rows["id"][by_track]) == 0
+def _previous(frame: Ints, track: Ints) -> Ints:
+    by_track = np.lexsort((frame, track))
+    previous = np.full(len(frame), -1)
+    same = np.diff(track[by_track]) == 0
     previous[by_track[1:][same]] = by_track[:-1][same]
     return previous
 
 
-def _certain(rows: Rows, previous: Ints) -> Flags:
+def _certain(frame: Ints, previous: Ints, alone: Flags) -> Flags:
     """Rows that follow their track in the very next frame, far from all others in both."""
-    alone = np.ones(len(rows), bool)
-    alone[near_rows(rows, EXCHANGE_DISTANCE)[0]] = False
-    follows = (previous >= 0) & (rows["frame"] - rows["frame"][previous] == 1)
+    follows = (previous >= 0) & (frame - frame[previous] == 1)
     return np.asarray(alone & alone[previous] & follows)

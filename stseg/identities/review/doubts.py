@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
-from stseg.arrays import Floats, Rows, by_track
+from stseg.arrays import Floats, Rows, columns, some_columns
 from stseg.records.track_heights import median_measured
 
 _ENCOUNTER_DISTANCE = 0.7
@@ -25,6 +25,8 @@ _BORDER_WIDTH = 0.5
 """Distance from the border of the area within which tracks may begin and end, metres."""
 _MARGIN_LIMIT = 12.0
 """Greatest doubt-free margin, nats: larger margins count as equal."""
+_COMPARED = columns("frame:<i8 id:<i8 x:<f8 y:<f8 height:<f4 score:<f4")
+"""Columns of TRAJECTORY that decide: the others of a day take a GB more."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,10 @@ def identity_doubts(trajectory: Rows, frame_rate: float) -> list[Doubt]:
 
 
 def _by_track(trajectory: Rows) -> dict[int, Rows]:
-    """Rows of each track in the order of time, by rising id."""
-    return {int(rows["id"][0]): rows for rows in by_track(trajectory)}
+    """Rows of each track in the order of time, by rising id: what is compared of them."""
+    rows = some_columns(trajectory, _COMPARED, np.lexsort((trajectory["frame"], trajectory["id"])))
+    parts = np.split(rows, np.flatnonzero(np.diff(rows["id"])) + 1) if len(rows) else []
+    return {int(part["id"][0]): part for part in parts}
 
 
 def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
