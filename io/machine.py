@@ -1,8 +1,9 @@
 """Limits of the machine: its cores, memory that is free for this process, and its address space."""
 
+import ctypes
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 try:
@@ -45,6 +46,12 @@ def _held() -> int:
         return int(Path("/proc/self/statm").read_text("ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):
         return _ENDLESS
+
+
+def return_freed_memory() -> None:
+    """Give the system what was freed: the C library of Linux keeps it where a small block in use lies after it."""
+    with suppress(AttributeError, OSError, TypeError):  # another library
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def free_cores() -> int:

@@ -140,7 +140,7 @@ def identity_problem(
 
 
 def box_tables(image_rig: Rig, breadth: float) -> list[BodyTable]:
-    """Of each view, for boxes in the pixels of its images."""
+    """Tables of the views, for boxes in the pixels of their images."""
     return [BodyTable.of(camera, image_rig.grid, breadth=breadth) for camera in image_rig.cameras]
 
 

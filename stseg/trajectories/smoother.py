@@ -156,8 +156,8 @@ def _smoothed_parts(
     for k, (turns, rows) in reversed(list(enumerate(parts))):
         state, spread = _smoothed(filtered(k), number[turns], after)
         first = int(number[turns][0])
-        after, own = (state[:first], spread[:first]), slice(first if k else 0, None)  # the part before has the others
-        yield order[rows][own], state[own, :2, 0], spread[own, :2, :2]
+        after, part = (state[:first], spread[:first]), slice(first if k else 0, None)  # the one before has the others
+        yield order[rows][part], state[part, :2, 0], spread[part, :2, :2]
 
 
 _States = tuple[Floats, Floats]

@@ -17,6 +17,7 @@ from stseg.commands.inspect import inspect
 from stseg.errors import FormatError, RigError, SourceError
 from stseg.io.detections.box_files import read_boxes
 from stseg.io.detections.masks import run_lengths
+from stseg.io.detections.packed_numbers import PackedNumbers
 from stseg.io.detections.record import Detections, listed_frames
 from stseg.io.detections.source_detections import instance_image, read_source
 from stseg.io.recording.streams import open_stream
@@ -72,6 +73,17 @@ def test_each_box_is_found_in_its_frame_in_the_order_of_the_file(tmp_path: Path,
         expected = [row[1:] for row in rows if row[0] == frame + 3]
         found = table.at(frame)
         np.testing.assert_array_equal(np.column_stack([found.pixel, found.score]), np.reshape(expected, (-1, 5)))
+
+
+@drawn(
+    60,
+    st.lists(
+        st.sampled_from((0.0, -0.0, 0.3, 1e5)) | st.integers(-(10**7), 10**7).map(lambda k: k / 1000) | st.floats(0, 1)
+    ),
+)
+def test_packed_numbers_keep_their_bits(numbers: list[float]) -> None:
+    assert PackedNumbers.of(np.array(numbers))[:].tobytes() == np.array(numbers).tobytes()
+    assert PackedNumbers.of(np.array([-0.0, 0.25])).whole.nbytes == 4
 
 
 @pytest.mark.parametrize(("name", "frames", "boxes"), [("CMC1_Cam1", 261, 1187), ("CMC2_Cam4", 263, 2221)])

@@ -15,6 +15,7 @@ from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
 from stseg.engine.pipeline import box_tables, finished_tracks
 from stseg.io.config_file import format_config
+from stseg.io.machine import return_freed_memory
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
@@ -83,7 +84,7 @@ class _StitchedRun:
 
 
 class _Association(NamedTuple):
-    """What association finds: the segments, the events before it, and the tracks."""
+    """The stitched segments, their events, and the tracks that association makes of them."""
 
     segments: list[_StitchedSegment]
     events: Rows
@@ -106,6 +107,7 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
     call
         How the tracks are associated, see `stseg.engine.offline.calls`.
     """
+    return_freed_memory()  # of tracking
     views = read_run(finished[0].path).views
     config, recording = format_config(job.config), with_alignment(job.recording, job.streams.frame_at_tick)
     with (
