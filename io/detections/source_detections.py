@@ -14,6 +14,7 @@ from stseg.io.detections.box_files import read_boxes, read_features
 from stseg.io.detections.formats import read_detections
 from stseg.io.detections.masks import Polygons
 from stseg.io.detections.record import Detections, Request
+from stseg.io.machine import return_freed_memory
 from stseg.io.recording.recording import Recording, Source
 from stseg.records.principal_axes import principal_axes
 from stseg.records.tables import FEATURES
@@ -68,13 +69,14 @@ def _read(source: Source, size: tuple[int, int], _stamp_of_file: tuple[int, int]
             raise SourceError(source.path, "classes", ", ".join(source.classes), "detections that have classes")
         boxes = read_boxes(source.path, source.first_frame, source.frames, source.appearance)
         found = replace(boxes, frame=boxes.frame + source.first_frame) if source.first_frame else boxes
-        return SourceDetections(
-            "boxes as text", found, boxes.of(boxes.score[:] >= source.least_score), boxes.frames or 0
-        )
+        kept = boxes.of(boxes.score[:] >= source.least_score)
+        return_freed_memory()  # of the text
+        return SourceDetections("boxes as text", found, kept, boxes.frames or 0)
     name, found = recognised
     if source.appearance is not None:
         found = replace(found, features=read_features(source.appearance, len(found)))
     found = found.packed()
+    return_freed_memory()  # of the file's objects
     kept = found.of(_wanted(found, source.classes, source.least_score))
     kept = replace(kept, frame=kept.frame - source.first_frame) if source.first_frame else kept
     return SourceDetections(name, found, kept, _length(source, found, kept))
