@@ -54,9 +54,8 @@ class _StitchedSegment:
         rows = read_run(self.path).trajectory
         return np.asarray(rows[rows["frame"] >= self.first])
 
-    def committed(self) -> Rows:
-        """The same under names of the run."""
-        rows = self.read()
+    def named(self, rows: Rows) -> Rows:
+        """The same rows, under names of the run from now on."""
         rows["id"] = self.names[rows["id"]]
         return rows
 
@@ -78,7 +77,7 @@ class _StitchedRun:
         """TRAJECTORY (n,), segment by segment."""
         rows, start = np.empty(sum(part.length for part in self.segments), TRAJECTORY), 0
         for part in self.segments:
-            rows[start : start + part.length] = part.committed()
+            rows[start : start + part.length] = part.named(part.read())
             start += part.length
         return rows
 
@@ -154,7 +153,7 @@ def _append_segments(job: Job, segments: Sequence[_StitchedSegment], identity: I
             order = np.argsort(rows["frame"], kind="stable")
             _append_labels(read_run(part.path), rows["frame"][order], rows["id"][order], ids[order], writer, packers)
             if not is_final:
-                writer.append("committed", part.committed())
+                writer.append("committed", part.named(rows))
 
 
 def _copy(run: Run, writer: RunWriter) -> None:
