@@ -39,8 +39,10 @@ class SourceDetections:
     @property
     def table(self) -> Detections:
         """The kept detections in the order of their frames."""
-        order = np.argsort(self.kept.frame, kind="stable")
-        return replace(self.kept.of(order), frames=self.frames)
+        frame, kept = self.kept.frame, self.kept
+        if (frame[1:] < frame[:-1]).any():
+            kept = kept.of(np.argsort(frame, kind="stable"))
+        return replace(kept, frames=self.frames)
 
 
 def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:

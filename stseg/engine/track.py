@@ -23,6 +23,7 @@ from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.identities.association import NO_KNOWN_PEOPLE
 from stseg.io.config_file import format_config
+from stseg.io.machine import return_freed_memory
 from stseg.io.outputs.whole_files import Inputs
 from stseg.io.recording.aligned_stream import StreamIndex, index_streams
 from stseg.io.recording.recording import Recording
@@ -165,6 +166,7 @@ def track_recording(
             job = Job(recording, config, tracker, volume, first, stop, streams, people)
             finished = _make_segments(job, folder, workforce, reporter)
             assemble(job, finished, folder.result, workforce.caller(job, reporter.note))
+            return_freed_memory()
             folder.publish(overwrite)
         folder.remove()
     return read_run(output)

@@ -37,6 +37,8 @@ _BEYOND_SHARE = 0.05
 """The same of boxes that begin beyond the right or lower edge of the image."""
 _COMPARED_FRAMES = 200
 """Frames, from all the recording, by which swapped cameras are found."""
+_BOXES_AT_ONCE = 1 << 15
+"""Boxes that are projected at a time: a day has millions."""
 _FOOT, _FOOT_OF_CENTRE = (0.5, 1.0), (0.0, 0.5)
 """From left and top to the middle of the lower edge, in widths and heights; the same if they are a box's centre."""
 
@@ -55,7 +57,9 @@ class SourceSummary:
 
     def ground(self, foot: tuple[float, float] = _FOOT) -> tuple[Floats, Flags]:
         """Where each foot projects, float64 (n, 2), metres; whether that is in the ground rectangle, bool (n,)."""
-        grid, ground = self.grid, self.camera.back_project(self.boxes[:, :2] + self.boxes[:, 2:] * foot)
+        grid, boxes = self.grid, self.boxes
+        parts = (boxes[k : k + _BOXES_AT_ONCE] for k in range(0, len(boxes) or 1, _BOXES_AT_ONCE))
+        ground = np.concatenate([self.camera.back_project(part[:, :2] + part[:, 2:] * foot) for part in parts])
         with np.errstate(invalid="ignore"):
             inside = (ground > [grid.x[0], grid.y[0]]) & (ground < [grid.x[1], grid.y[1]])
         return ground, np.asarray(inside.all(axis=1))

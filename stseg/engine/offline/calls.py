@@ -1,10 +1,9 @@
-"""A call whose result is needed later: in another process, while this one goes on, or here, once it is asked for."""
+"""A call whose result is needed later: in another process, while this one goes on, or here, at once."""
 
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
 from multiprocessing.connection import Connection
 from typing import Protocol, TypeVar
 
@@ -25,8 +24,9 @@ class Caller(Protocol):
 
 @contextmanager
 def called_here(function: Callable[..., _Result], *arguments: object) -> Iterator[Callable[[], _Result]]:
-    """Call in this process, once the result is asked for."""
-    yield partial(function, *arguments)
+    """Call in this process, at once: what is needed only beside the result takes no memory yet."""
+    result = function(*arguments)
+    yield lambda: result
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from stseg.engine.offline.segments import Segment
 from stseg.engine.reporter import Advance
 from stseg.engine.session import run_session, two_cores
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.io.machine import return_freed_memory
 from stseg.io.recording.frames import open_frames
 
 
@@ -32,6 +33,7 @@ class SegmentWorker:
         `advance` is called with the number of further frames of the segment that were fused.
         """
         job = self.job
+        return_freed_memory()  # of the segment before
 
         def fused(frame: int) -> None:
             advance(int(segment.first <= frame < segment.stop))
