@@ -20,6 +20,8 @@ _STANDING = 0.85
 """Share of feet that meet feet of their own view at another time, above which people stand and nothing can be said."""
 _LAGS = (0.3, 0.5, 0.7)
 """Shifts in time by which chance is measured, in lengths of the recording."""
+_PLACES_AT_ONCE = 1 << 15
+"""Places that are projected at a time."""
 _LEAST_FEET, _FRAMES = 50, 200
 """Least number of feet for a statement, and number of frames that are looked at."""
 
@@ -57,10 +59,11 @@ def _visible(index: int, cameras: Sequence[Camera], ground: Floats) -> Flags:
     """Whether a camera other than the own sees a place, bool (n,)."""
     visible = np.zeros(len(ground), bool)
     for k, camera in enumerate(cameras):
-        if k != index:
-            pixel, ahead = camera.project(ground, 0.0)
+        for start in range(0, len(ground) if k != index else 0, _PLACES_AT_ONCE):
+            part = slice(start, start + _PLACES_AT_ONCE)
+            pixel, ahead = camera.project(ground[part], 0.0)
             with np.errstate(invalid="ignore"):
-                visible |= ahead & (pixel >= 0).all(axis=1) & (pixel < camera.size).all(axis=1)
+                visible[part] |= ahead & (pixel >= 0).all(axis=1) & (pixel < camera.size).all(axis=1)
     return visible
 
 
