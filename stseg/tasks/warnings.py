@@ -21,7 +21,7 @@ _BLIND_SHARE = 0.05
 _CHECKED_FRAMES = 160
 """Frames by which swapped cameras are found where a view looks wrong."""
 _DOUBTFUL_MISSES = 0.1
-"""Miss rate from which they are looked for: they leave rates of 0.13 to 0.7, right views 0.03 to 0.1."""
+"""Miss rate from which they are looked for: swaps leave 0.13 to 0.8, right views 0.03 to 0.1, in crowds more."""
 _UNLIKE = 1.4
 """Least ratio of that rate to the least one of all views or to the first guess: swaps leave 1.7 or more."""
 _MOVED = 1.0

@@ -81,7 +81,9 @@ def find_swapped_streams(rig: Rig, boxes_by_frame: BoxesByFrame) -> tuple[tuple[
     places = [_standing(camera, rig.grid, boxes) for camera, boxes in zip(rig.cameras, streams, strict=True)]
     now = np.zeros((len(places), len(places), 2))
     for a, b in combinations(range(len(places)), 2):
-        now[a, b] = now[b, a] = _beyond_chance([(places[a], places[b])], len(frames))
+        pair = [(places[a], places[b])]
+        met = _meetings(pair, len(frames))
+        now[a, b] = now[b, a] = met - _meetings_by_chance(pair, len(frames)), met
     gains, best = dict[tuple[int, int], float](), 0.0
     for a, b in combinations(range(len(places)), 2):
         if rig.cameras[a].size != rig.cameras[b].size:
@@ -89,12 +91,12 @@ def find_swapped_streams(rig: Rig, boxes_by_frame: BoxesByFrame) -> tuple[tuple[
         swapped = _standing(rig.cameras[a], rig.grid, streams[b]), _standing(rig.cameras[b], rig.grid, streams[a])
         others = [(one, places[view]) for view in range(len(places)) if view not in (a, b) for one in swapped]
         before, pairs = now[a].sum(axis=0) + now[b].sum(axis=0) - now[a, b], [swapped, *others]
-        met, people = sum(_meeting_count(*two, 0, len(frames)) for two in pairs), sum(len(one.frame) for one in swapped)
+        met, people = _meetings(pairs, len(frames)), sum(len(one.frame) for one in swapped)
         least = max(_SWAP_GAIN * before[0], _MEETING_SHARE * people, MIN_PEOPLE)
         chance = _CERTAIN * float(met + before[1]) ** 0.5
         if met - before[0] <= chance or met <= least:
             continue  # whatever it is beyond chance
-        after = _beyond_chance(pairs, len(frames))[0]
+        after = met - _meetings_by_chance(pairs, len(frames))
         gain = float(after - before[0])
         if gain > chance and after > least:
             gains[a, b], best = gain, max(best, gain - chance)
@@ -108,17 +110,19 @@ def _standing(camera: Camera, grid: Grid, boxes: Sequence[Floats]) -> Standing:
     return Standing(frame, ground, cKDTree(_apart(frame, ground)))
 
 
-def _beyond_chance(pairs: Sequence[tuple[Standing, Standing]], frames: int) -> Floats:
-    """Number of people near one of another view, less that at other times, and the number itself, float64 (2,)."""
-    now, *others = (sum(_meeting_count(*two, int(lag * frames), frames) for two in pairs) for lag in (0.0, *_LAGS))
-    return np.array([now - np.mean(others), now])
+def _meetings_by_chance(pairs: Sequence[tuple[Standing, Standing]], frames: int) -> float:
+    """Number of people near one of another view at other times."""
+    return float(np.mean([_meetings(pairs, frames, int(lag * frames)) for lag in _LAGS]))
 
 
-def _meeting_count(one: Standing, other: Standing, lag: int, frames: int) -> int:
-    """Number of people of one view who are near one of another view, as many frames later."""
-    later = (one.frame + lag) % frames  # the recording begins anew at its end
-    away, _ = other.tree.query(_apart(later, one.ground), distance_upper_bound=_MEETING_DISTANCE)
-    return int(np.count_nonzero(away < _MEETING_DISTANCE))
+def _meetings(pairs: Sequence[tuple[Standing, Standing]], frames: int, lag: int = 0) -> int:
+    """Number of people of the first views who are near one of the second, as many frames later."""
+    number = 0
+    for one, other in pairs:
+        later = (one.frame + lag) % frames  # the recording begins anew at its end
+        away, _ = other.tree.query(_apart(later, one.ground), distance_upper_bound=_MEETING_DISTANCE)
+        number += int(np.count_nonzero(away < _MEETING_DISTANCE))
+    return number
 
 
 def _apart(frame: Ints, ground: Floats) -> Floats:
