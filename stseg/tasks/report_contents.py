@@ -107,7 +107,7 @@ def _facts(run: Run, span: Span) -> list[tuple[str, str]]:
         ("frames per second", f"{span.frame_rate:g}"),
         ("ground", f"{grid.x[1] - grid.x[0]:g} m x {grid.y[1] - grid.y[0]:g} m"),
         ("cells", f"{grid.cell:g} m, {grid.planes} planes"),
-        *([("work of all cores", clock_time(computed))] if computed > 0 else []),
+        *([("time of all stages", clock_time(computed))] if computed > 0 else []),
     ]
 
 

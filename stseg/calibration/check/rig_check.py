@@ -117,10 +117,12 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
         sentences.append(f"too few people stand alone before {', '.join(silent)} to judge (fewer than {MIN_PEOPLE})")
     if not sentences:
         worst = max((one for one in check.verdict.views if one is not None), key=lambda one: one.off)
-        sentences.append(
-            f"the views agree: none is off by more than a cell ({100 * rig.grid.cell:.0f} cm); "
-            f"{names[worst.view]} most, by {100 * worst.off:.0f} cm"
-        )
+        cell, most = f"a cell ({100 * rig.grid.cell:.0f} cm)", f"{names[worst.view]} most, by {100 * worst.off:.0f} cm"
+        if worst.off <= rig.grid.cell:
+            sentences.append(f"the views agree: none is off by more than {cell}; {most}")
+        else:
+            least = f"certainly by {100 * worst.certainly_off:.0f} cm"
+            sentences.append(f"no view is certainly off by more than {cell}; {most}, {least}: look at more frames")
     return sentences
 
 

@@ -2,8 +2,8 @@
 
 Leave-one-out residuals are smoothed over the ground by a plane for the middle, the heads and the feet each, which shows
 a turned or tilted camera as well as a shifted one. A component common to all views (a box's edges lie beyond a body's)
-is removed. A view is reported when it is off by more than a cell and when correcting it, among the most displaced ones,
-makes all views agree best; the others are judged after the correction.
+is removed. A view is reported when it is off by more than a cell beyond two standard errors, and when correcting it,
+among the most displaced ones, makes all views agree best; the others are judged after the correction.
 """
 
 import math
@@ -24,8 +24,11 @@ MIN_PEOPLE = 20
 _ROUNDS = 15
 _DIFFERENCE = 0.01
 """Step of the finite differences, metres."""
-_FEET_COLUMN, _OCCLUSION_WEIGHT = 2, 0.35
-"""Column of the feet, and the weight of a lower edge above them: others and furniture hide feet."""
+_ABOVE_WEIGHT = (1.0, 0.35, 0.35)
+"""Weights of negative residuals of middles, heads and feet: blobs of heads hold others behind, and what hides feet
+leaves a lower edge above them."""
+_SPANS = 8
+"""Spans of time that are left out in turn: what others hide of a person stays hidden for a while."""
 _SUSPECTS = 3
 """Number of the most displaced views that are tried as the cause."""
 
@@ -45,6 +48,9 @@ class Disagreement:
     feet: float
     heads: float
     """Root mean square of the smoothed disagreement across the viewing ray at feet and heads, metres."""
+    feet_error: float
+    heads_error: float
+    """Root mean square of their standard errors, metres."""
     right: float
     down: float
     """Its mean at the feet: the view's people against the others', metres."""
@@ -57,9 +63,17 @@ class Disagreement:
     def off(self) -> float:
         """Displacement likely due to the view itself, the larger of feet and heads, metres.
 
-        Where every view errs by s, one of them and the mean of m others are s sqrt(1 + 1 / m) apart.
+        Its mean square is that of the disagreement less that of its error. Where every view errs by s, one of them and
+        the mean of m others are s sqrt(1 + 1 / m) apart.
         """
-        return max(self.feet, self.heads) / math.sqrt(1 + 1 / self.others)
+        square = max(self.feet**2 - self.feet_error**2, self.heads**2 - self.heads_error**2, 0.0)
+        return math.sqrt(square / (1 + 1 / self.others))
+
+    @property
+    def certainly_off(self) -> float:
+        """The same less two standard errors: at least so much, metres."""
+        least = max(self.feet - 2 * self.feet_error, self.heads - 2 * self.heads_error, 0.0)
+        return least / math.sqrt(1 + 1 / self.others)
 
 
 @dataclass(frozen=True)
@@ -75,6 +89,8 @@ class _RawDisagreement:
     field: Floats
     """float64 (n, 3): the same of each person: middle to the right, head and feet downwards, metres across the viewing
     ray."""
+    variance: Floats
+    """float64 (n, 3): variances of `field`, square metres."""
     scale: Floats
     """float64 (n,): pixels a metre at each person."""
     slope: Floats
@@ -92,7 +108,8 @@ class _RawDisagreement:
         right, down = field[:, [0, 2]].mean(axis=0).tolist()
         compared = (self.view, self.others, len(field), self.confirmed)
         ends = (_size(field[:, [0, 2]]), _size(field[:, [0, 1]]))
-        return Disagreement(*compared, *ends, right, down, _size(moved), _size(feet))
+        errors = (_size(np.sqrt(self.variance[:, [0, 2]])), _size(np.sqrt(self.variance[:, [0, 1]])))
+        return Disagreement(*compared, *ends, *errors, right, down, _size(moved), _size(feet))
 
 
 def _raw_disagreement(
@@ -107,17 +124,28 @@ def _raw_disagreement(
     if measured.sum() < MIN_PEOPLE:
         return None
     confirmed = float(people.has_box[inside, view].mean()) if inside.any() else 0.0
-    ground = located.ground[measured]
-    middle, planes = _smooth(ground, across[measured])
-    field = _on_planes(ground, middle, planes)
+    ground, across = located.ground[measured], across[measured]
+    across[:, np.isfinite(across).sum(axis=0) < MIN_PEOPLE] = np.nan
+    middle, planes = _smooth(ground, across)
+    field, variance = _on_planes(ground, middle, planes), _variance(ground, across)
     slope = np.asarray(np.linalg.inv(ground_jacobian(camera, ground, _DIFFERENCE)), float)
     scale = pixel_height[measured] / located.height[measured]
-    return _RawDisagreement(view, len(others), confirmed, middle, planes, field, scale, slope)
+    return _RawDisagreement(view, len(others), confirmed, middle, planes, field, variance, scale, slope)
 
 
 def _on_planes(ground: Floats, middle: Floats, planes: Floats) -> Floats:
     """Values of planes at places (n, 2), float64 (n, column)."""
     return np.asarray(np.column_stack([np.ones(len(ground)), ground - middle]) @ planes)
+
+
+def _variance(ground: Floats, across: Floats) -> Floats:
+    """Variance of smoothed rows (n, 3), by rising frame, float64 (n, 3), square metres.
+
+    The jackknife over spans of time (Efron and Stein 1981): rows of one person are not independent.
+    """
+    span = np.arange(len(ground)) * _SPANS // len(ground)
+    fields = [_on_planes(ground, *_smooth(ground[span != k], across[span != k])) for k in range(_SPANS)]
+    return np.asarray((_SPANS - 1) * np.var(fields, axis=0))
 
 
 def _smooth(ground: Floats, across: Floats) -> tuple[Floats, Floats]:
@@ -127,15 +155,14 @@ def _smooth(ground: Floats, across: Floats) -> tuple[Floats, Floats]:
     found = np.zeros((3, across.shape[1]))
     for column in range(across.shape[1]):
         measured = np.isfinite(across[:, column])
-        if measured.sum() < MIN_PEOPLE:
+        if not measured.any():
             continue
         rows, value, weight = basis[measured], across[measured, column], np.ones(int(measured.sum()))
         for _ in range(_ROUNDS):
             normal = (rows * weight[:, None]).T @ rows + np.diag([0.0, 1e-3, 1e-3])
             found[:, column] = np.linalg.solve(normal, (rows * weight[:, None]).T @ value)
             rest = value - rows @ found[:, column]
-            hidden = _OCCLUSION_WEIGHT if column == _FEET_COLUMN else 1.0
-            weight = np.where(rest < 0, hidden, 1.0) / np.maximum(np.abs(rest), 0.01)
+            weight = np.where(rest < 0, _ABOVE_WEIGHT[column], 1.0) / np.maximum(np.abs(rest), 0.01)
     return middle, found
 
 
@@ -171,7 +198,7 @@ def judge(rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences) -> 
         if not trials:
             break
         _, worst, people, current = min(trials, key=lambda trial: trial[0])
-        if worst.off <= rig.grid.cell:
+        if worst.certainly_off <= rig.grid.cell:
             break
         named.append(worst)
     whole = _judged(first)
@@ -223,4 +250,4 @@ def _corrected(people: BoxCorrespondences, table: BodyTable, raw: _RawDisagreeme
 
 
 def _worst(raw: Sequence[_RawDisagreement | None]) -> float:
-    return max((one.off for one in _judged(raw)), default=0.0)
+    return max((one.certainly_off for one in _judged(raw)), default=0.0)
