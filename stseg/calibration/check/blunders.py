@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from stseg.arrays import Floats, Ints
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.box_correspondence import (
+    SPANS,
     BoxCorrespondences,
     candidates,
     match_boxes,
@@ -147,9 +148,20 @@ def find_stream_delay(
         if not np.isfinite(misfit).all():
             continue
         best = int(misfit.argmin())
-        if misfit[best] < clearest * misfit[most]:
+        if misfit[best] < clearest * misfit[most] and _is_lasting(
+            tables[view], view, boxes_by_frame, located, shifts[best]
+        ):
             clearest, found = float(misfit[best] / misfit[most]), StreamDelay(view, shifts[best])
     return found
+
+
+def _is_lasting(
+    table: BodyTable, view: int, boxes_by_frame: BoxesByFrame, people: BoxCorrespondences, shift: int
+) -> bool:
+    """Whether a delay fits better without each span of time, too: one person who turns may pass for a delay."""
+    parts = [people.without_span(span) for span in range(SPANS)]
+    misfits = [[_misfit(table, view, boxes_by_frame, part, at) for at in (0, shift)] for part in parts]
+    return all(delayed < _DELAY_MISFIT * undelayed for undelayed, delayed in misfits)
 
 
 def without_delay(boxes_by_frame: BoxesByFrame, one: StreamDelay, size: int) -> dict[int, list[Floats]]:

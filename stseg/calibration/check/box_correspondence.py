@@ -27,6 +27,8 @@ _MIN_WIDTH, _MAX_WIDTH = 0.4, 2.0
 """Least and greatest width of a single person's box, in body widths."""
 _BORDER = 2.0
 """Distance from the image border within which a box counts as cut, pixels."""
+SPANS = 8
+"""Spans of time that are left out in turn: the errors of one person, and what hides them, last for a while."""
 _MARGIN = 0.5
 """Margin around the area in which candidates are kept, metres."""
 
@@ -51,6 +53,16 @@ class BoxCorrespondences:
     def has_box(self) -> Flags:
         """Whether each view has a box of each person, bool (n, view)."""
         return np.asarray(np.isfinite(self.box[..., 0]))
+
+    def without_span(self, span: int) -> "BoxCorrespondences":
+        """The people without those of one of `SPANS`."""
+        rows = spans(len(self)) != span
+        return BoxCorrespondences(self.frame[rows], self.ground[rows], self.height[rows], self.box[rows])
+
+
+def spans(rows: int) -> Ints:
+    """Span of time of each row, by rising frame, int64 (rows,)."""
+    return np.arange(rows) * SPANS // max(rows, 1)
 
 
 def tables_of(rig: Rig) -> list[BodyTable]:

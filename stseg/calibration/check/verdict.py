@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.bodies.pillars import BodyTable
-from stseg.calibration.check.box_correspondence import BoxCorrespondences, wholly_visible
+from stseg.calibration.check.box_correspondence import SPANS, BoxCorrespondences, spans, wholly_visible
 from stseg.calibration.check.leave_one_out import edge_residuals, locate
 from stseg.calibration.pinhole import ground_jacobian
 from stseg.geometry import Camera, Rig
@@ -27,8 +27,6 @@ _DIFFERENCE = 0.01
 _ABOVE_WEIGHT = (1.0, 0.35, 0.35)
 """Weights of negative residuals of middles, heads and feet: blobs of heads hold others behind, and what hides feet
 leaves a lower edge above them."""
-_SPANS = 8
-"""Spans of time that are left out in turn: what others hide of a person stays hidden for a while."""
 _SUSPECTS = 3
 """Number of the most displaced views that are tried as the cause."""
 
@@ -143,9 +141,9 @@ def _variance(ground: Floats, across: Floats) -> Floats:
 
     The jackknife over spans of time (Efron and Stein 1981): rows of one person are not independent.
     """
-    span = np.arange(len(ground)) * _SPANS // len(ground)
-    fields = [_on_planes(ground, *_smooth(ground[span != k], across[span != k])) for k in range(_SPANS)]
-    return np.asarray((_SPANS - 1) * np.var(fields, axis=0))
+    kept = [spans(len(ground)) != span for span in range(SPANS)]
+    fields = [_on_planes(ground, *_smooth(ground[rows], across[rows])) for rows in kept]
+    return np.asarray((SPANS - 1) * np.var(fields, axis=0))
 
 
 def _smooth(ground: Floats, across: Floats) -> tuple[Floats, Floats]:
