@@ -15,7 +15,7 @@ from stseg.kernels.accelerate import COMPILED
 MAP_TYPE: type[np.float32] = np.float32 if COMPILED else np.float64  # type: ignore[assignment]
 """Type of maps: plain Python would sum float32 in float32, compiled code sums it in float64."""
 
-PARAMETERS = ScoreParameters(-3.0, 0.3, 0.25, 0.42, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
+PARAMETERS = ScoreParameters(-3.0, 0.3, 0.25, 0.42, 3.0, 0.2, 0.9, 0.02, 2.0)
 
 
 @dataclass(frozen=True)

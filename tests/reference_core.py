@@ -118,8 +118,7 @@ def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, parame
     gains: list[tuple[float, int, int]] = []
     for j in members:
         visible = boxes.inside[view, j] * math.prod(left_by_all(boxes)[view, j, k] for k in members)
-        share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
-        found = min(max(share, parameters.hidden_detection_rate), 1.0)
+        found = min(max(visible / parameters.full_visibility, parameters.hidden_detection_rate), 1.0)
         missing = math.log(1 - (1 - parameters.box_miss_rate) * found)
         total += missing
         worth = parameters.box_log_ratio - missing

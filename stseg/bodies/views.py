@@ -143,9 +143,8 @@ class BoxView(View):
 
     def found_share(self, visible: Floats) -> Floats:
         """Detection rate of a body by its visible share, relative to that of a whole one."""
-        config = self.config
-        share = (visible - config.hidden_visibility) / (config.full_visibility - config.hidden_visibility)
-        return np.asarray(share.clip(config.hidden_detection_rate, 1.0))
+        share = visible / self.config.full_visibility
+        return np.asarray(share.clip(self.config.hidden_detection_rate, 1.0))
 
     def observe(self, evidence: Boxes | Singles | None, noise: BoxNoise = PRIOR_NOISE) -> ViewObservation:
         """The frame's boxes."""

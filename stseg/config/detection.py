@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from stseg.config.ranges import COUNT, METRES, Settings, at_least, not_negative, positive, require, share, within
+from stseg.config.ranges import COUNT, METRES, Settings, at_least, not_negative, positive, share, within
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,8 @@ class DetectionConfig(Settings):
     """Log-likelihood ratio, person against clutter, of a box that fits perfectly, nats."""
     box_miss_rate: float = share(0.20)
     """Probability that a detector misses a fully visible person, 0..1."""
-    hidden_visibility: float = 0.20
-    """Visible share of a body below which a detector finds almost none, 0..1."""
-    full_visibility: float = 0.90
-    """Visible share of a body from which a detector finds it as if fully visible, 0..1."""
+    full_visibility: float = within(0.90, lambda value: 0 < value <= 1, "above 0, at most 1")
+    """Visible share of a body from which a detector finds it as if fully visible, 0..1; below, in proportion."""
     hidden_detection_rate: float = share(0.02)
     """Share of hidden people that a detector finds all the same, 0..1."""
     effective_observations: float = positive(4.0)
@@ -42,15 +40,6 @@ class DetectionConfig(Settings):
     """Longest time between two frames whose whole ground is searched, seconds; 0 to search it in every frame."""
     swap_moves: int = not_negative(2, most=COUNT)
     """Rounds of swap moves (one person for two, and the like) in larger groups, where all views deliver pixels."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(
-            0 <= self.hidden_visibility < self.full_visibility <= 1,
-            self,
-            "hidden_visibility",
-            "0 to below full_visibility, at most 1",
-        )
 
 
 @dataclass(frozen=True)

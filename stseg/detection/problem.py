@@ -61,7 +61,6 @@ class ScoreParameters(NamedTuple):
     common_width: float
     box_log_ratio: float
     box_miss_rate: float
-    hidden_visibility: float
     full_visibility: float
     hidden_detection_rate: float
     effective_observations: float

@@ -255,7 +255,7 @@ CROWD = "frame,id,x,y\n" + "".join(f"0,{k},0,0\n" for k in range(20_000))
         (ValueError, lambda at: read_bytes(text(at / "a", "abc"), 2), "more than 2 bytes"),
         (ValueError, lambda at: require_sound_heaps(text(at / "a", HEAPS)), "a global heap at byte 32 inside of anoth"),
         (ValueError, lambda at: read_whole(unwritten(at / "a")), "80000 bytes declared, 0 stored"),
-        (ConfigError, lambda _: read_config(None, ("detection.hidden_visibility=1",)), "0 to below full_visibility"),
+        (ConfigError, lambda _: read_config(None, ("detection.full_visibility=0",)), "above 0, at most 1"),
         (ConfigError, lambda _: read_config(None, ("body.height_mean=0.01",)), "more than two standard deviations"),
         (OSError, lambda _: FFmpegCapture("file:///etc/passwd", 1.0), "no address of a live stream"),
         (OSError, lambda _: FFmpegCapture("rtsp://127.0.0.1:9/x", 0.1), "no stream that FFmpeg opens"),

@@ -71,7 +71,5 @@ def body_distance(i: int, j: int, ground: Floats, breadth: Floats) -> float:
 @part
 def missing_box_cost(visible: float, parameters: ScoreParameters) -> float:
     """Cost of a missing box of a body of which such a share is visible, nats."""
-    share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
-    return float(
-        np.log(1.0 - (1.0 - parameters.box_miss_rate) * min(max(share, parameters.hidden_detection_rate), 1.0))
-    )
+    share = min(max(visible / parameters.full_visibility, parameters.hidden_detection_rate), 1.0)
+    return float(np.log(1.0 - (1.0 - parameters.box_miss_rate) * share))

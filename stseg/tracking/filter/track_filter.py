@@ -26,7 +26,9 @@ from stseg.tracking.filter.motion_model import augmented_noise, augmented_transi
 _SIZE_DRIFT = 0.002
 """Random walk of a person's apparent height and width, metres per square root of a second: shoes, stoop, lens."""
 DETECTED_LOG_ODDS = 1.0
-"""Greatest log-odds that a person detected in one frame is detected in the next, nats."""
+"""Greatest log-odds that a person detected in one frame is detected in the next, nats; of a new track."""
+_STANDING_LOG_ODDS, _STANDING_TIME = 1.0, 10.0
+"""Growth of these while a track stands, nats, and its duration, seconds: ghosts last for less, and people stay."""
 _LEAST_ODDS = -6.0
 """Log-odds below which a rejected candidate starts no tentative track, nats."""
 _REPEATED_EVIDENCE = 2.0
@@ -85,8 +87,9 @@ class TrackState(NamedTuple):
 
     track: int
     """Number, from 1; 0 for a tentative track: a candidate that was rejected, but may be confirmed later."""
+    first_seen: int
     last_seen: int
-    """Frame of the last detection."""
+    """Frames of the first and the last detection."""
     state: Floats
     covariance: Floats
     """float64 (6,) and (6, 6): x, y, vx, vy in metres and metres per second, and the lasting part of the body's
@@ -205,7 +208,7 @@ class TrackFilter:
                 track, before = self._birth(frame, people, j).resized(heights[j], widths[j]), self.birth_log_odds
             if track.track == 0:
                 self.issued += 1
-            odds = min(float(before + people.evidence[j] - people.prior[j]), DETECTED_LOG_ODDS)
+            odds = min(float(before + people.evidence[j] - people.prior[j]), self._greatest_odds(track, frame))
             detected.append(track._replace(track=track.track or self.issued, odds=odds))
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
@@ -214,6 +217,11 @@ class TrackFilter:
         self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
         return names
+
+    def _greatest_odds(self, track: TrackState, frame: int) -> float:
+        """Greatest log-odds of a track that a frame detected, nats."""
+        seconds = (frame - track.first_seen) / self.frame_rate
+        return DETECTED_LOG_ODDS + _STANDING_LOG_ODDS * min(seconds / _STANDING_TIME, 1.0)
 
     def _undetected(self, frame: int, people: People) -> list[int]:
         """Indices of confirmed tracks that a frame did not detect, for as long as patience lasts."""
@@ -264,7 +272,7 @@ class TrackFilter:
         spread[:2, 4:] = spread[4:, :2] = -stray
         state, prior = np.append(people.ground[j], np.zeros(4)), self.body
         sizes = (prior.height_mean, prior.height_spread**2, prior.width_mean, prior.width_spread**2)
-        return TrackState(0, frame, state, spread, *sizes, 0.0)
+        return TrackState(0, frame, frame, state, spread, *sizes, 0.0)
 
 
 def repeated_evidence(evidence: Sequence[ViewEvidence]) -> float:
