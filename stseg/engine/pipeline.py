@@ -136,7 +136,7 @@ def identity_problem(
 ) -> IdentityProblem:
     """Identities of the committed rows, as a problem of which single decisions can be tried."""
     bridged, sizes = bridged_rows(committed, rig.frame_rate, config)
-    return IdentityProblem.of(bridged, sizes, appearance, rig.frame_rate, Border.of(rig), config, constraints)
+    return IdentityProblem.of(bridged, sizes, (appearance,), rig.frame_rate, Border.of(rig), config, constraints)
 
 
 def box_tables(image_rig: Rig, breadth: float) -> list[BodyTable]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class IdentityProblem:
         cls,
         trajectory: Rows,
         sizes: MeasuredSizes,
-        appearance: Rows,
+        appearance: Iterable[Rows],
         frame_rate: float,
         border: Border,
         config: Config,
@@ -56,9 +57,10 @@ class IdentityProblem:
     ) -> IdentityProblem:
         """The problem of a run; sizes and appearance are learned from it.
 
-        `trajectory` is TRAJECTORY (n,) in any order, `sizes` are those of each row, and `appearance` is APPEARANCE (l,)
-        of detections. `frame_rate` is in frames per second; people come and go at the border. The constraints are pairs
-        of rows that are one person, or two: identities from which appearance is learned obey them.
+        `trajectory` is TRAJECTORY (n,) in any order, `sizes` are those of each row, and `appearance` are parts,
+        APPEARANCE (l,) each (`row_means`). `frame_rate` is in frames per second; people come and go at the border. The
+        constraints are pairs of rows that are one person, or two: identities from which appearance is learned obey
+        them.
         """
         tracklets, tracking = isolated_tracklets(trajectory, frame_rate), config.tracking
         limits = SearchLimits(tracking.hypotheses, tracking.maximum_gap, tracking.identity_lag)
@@ -66,19 +68,20 @@ class IdentityProblem:
 
         def problem(learned: LearnedAppearance) -> IdentityProblem:
             joined = SizeModel.joined([model, learned.model])
-            value = np.concatenate([sizes.value, learned.value], axis=1)
-            observations = observe(trajectory, value, joined, frame_rate, border, config)
+            columns = [*sizes.value.T, *learned.value.T]
+            observations = observe(trajectory, columns, joined, frame_rate, border, config)
             return cls(observations, joined, config.motion, limits, frame_rate, learned.colours)
 
-        def learned(person: Ints) -> LearnedAppearance:
-            return learn_appearance(trajectory["frame"], appearances, tracklets, person, frame_rate)
+        def learned() -> LearnedAppearance:
+            appearances = row_looks(trajectory, appearance)
+            if not any(np.isfinite(value[:, 0]).any() for value in appearances):
+                return LearnedAppearance.nothing(len(trajectory))
+            by = partial(learn_appearance, trajectory["frame"], appearances, tracklets, frame_rate=frame_rate)
+            # Tracklets are right, but appearance outlasts them; identities last, and with appearance few are wrong.
+            drafted = -(-tracking.hypotheses // _DRAFT_DIVISOR)
+            return by(problem(by(_tracklet_of(tracklets))).with_hypotheses(drafted).solve(constraints))
 
-        if not len(appearance):
-            return problem(LearnedAppearance.nothing(len(trajectory)))
-        appearances = row_looks(trajectory, appearance)
-        # Tracklets are right, but appearance outlasts them; identities last, and with appearance few are wrong.
-        draft = problem(learned(_tracklet_of(tracklets))).with_hypotheses(-(-tracking.hypotheses // _DRAFT_DIVISOR))
-        return problem(learned(draft.solve(constraints)))
+        return problem(learned())
 
     def with_hypotheses(self, number: int) -> IdentityProblem:
         """The problem with another number of hypotheses."""
@@ -105,7 +108,7 @@ class IdentityProblem:
         if self.colours is not None and len(earlier):
             axes = self.colours.of(earlier["colours"])
             value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, earlier["appearance_count"][:, None]
-        precision, information = self.model.evidence(value)
+        precision, information = self.model.evidence([*value.T])
         return visits.after(earlier["id"], number * precision, number * information)
 
     def score(self, constraints: Constraints, chosen: Ints, left_out: Ints, stand_in: Ints) -> float:

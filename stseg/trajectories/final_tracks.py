@@ -10,7 +10,7 @@ Global association moves no place: it decides which rows belong to one person, a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -46,7 +46,7 @@ class AnyCommittedRows(Protocol):
     @property
     def events(self) -> Rows: ...
     @property
-    def appearance(self) -> Rows: ...
+    def appearance_parts(self) -> Iterable[Rows]: ...
     @property
     def known_people(self) -> Rows: ...
 
@@ -62,6 +62,11 @@ class CommittedRows(NamedTuple):
     """APPEARANCE (l,): what the detections look like."""
     known_people: Rows = NO_KNOWN_PEOPLE
     """KNOWN_PERSON (m,): people of earlier recordings."""
+
+    @property
+    def appearance_parts(self) -> tuple[Rows]:
+        """The whole, as one part."""
+        return (self.appearance,)
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,7 @@ def final_tracks(
     People of earlier recordings keep their ids; all others have greater ones.
     """
     bridged, track, sizes = _bridged(rows.trajectory, frame_rate, config)
-    problem = IdentityProblem.of(bridged, sizes, rows.appearance, frame_rate, border, config, constraints)
+    problem = IdentityProblem.of(bridged, sizes, rows.appearance_parts, frame_rate, border, config, constraints)
     linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
     committed, named = bridged[: len(track)], linked.identity[: len(track)]

@@ -51,7 +51,7 @@ class LiveCorrections:
 
     def _decided_again(self, decided: int, new_id: Callable[[], int]) -> Rows:
         bridged, sizes = bridged_rows(self._rows, self._rate, self._config)
-        problem = IdentityProblem.of(bridged, sizes, self._appearance, self._rate, self._border, self._config)
+        problem = IdentityProblem.of(bridged, sizes, (self._appearance,), self._rate, self._border, self._config)
         linked = associate_globally(bridged, problem)
         identity = linked.identity[: len(self._rows)]
         last_id = int(bridged["id"].max())

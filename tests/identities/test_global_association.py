@@ -17,7 +17,7 @@ from stseg.tracking.row_groups import isolated_tracklets
 
 def relinked(rows: Rows) -> GlobalAssociation:
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    return associate_globally(rows, IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG))
+    return associate_globally(rows, IdentityProblem.of(rows, sizes, (), RATE, BORDER, CONFIG))
 
 
 MET = range(72, 89)
@@ -150,7 +150,9 @@ def appearance(rows: Rows, true: Ints, noise: float, differ: float, seed: int, n
 
 def learned(rows: Rows, looks: Rows, person: Ints | None = None) -> LearnedAppearance:
     tracklets, person = isolated_tracklets(rows, RATE), rows["id"] if person is None else person
-    return learn_appearance(rows["frame"], row_looks(rows, looks), tracklets, person, RATE)
+    by_parts = row_looks(rows, [looks[looks["frame"] < 80], looks[looks["frame"] >= 80]])
+    np.testing.assert_allclose(np.hstack(by_parts), np.hstack(row_looks(rows, (looks,))), atol=1e-9)
+    return learn_appearance(rows["frame"], by_parts, tracklets, person, RATE)
 
 
 def distance(value: Floats, a: Ints, b: Ints) -> float:
@@ -205,7 +207,7 @@ def test_looks_that_last_count_less_and_offsets_are_undone() -> None:
 
 def associated(rows: Rows, looks: Rows) -> Ints:
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    return associate_globally(rows, IdentityProblem.of(rows, sizes, looks, RATE, BORDER, CONFIG)).identity
+    return associate_globally(rows, IdentityProblem.of(rows, sizes, (looks,), RATE, BORDER, CONFIG)).identity
 
 
 def test_features_tell_apart_and_are_learned_from_errors() -> None:

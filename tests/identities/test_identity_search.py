@@ -26,7 +26,6 @@ from stseg.identities.search.constraints import Constraints
 from stseg.identities.search.extension import Alternatives
 from stseg.identities.search.hypotheses import Hypotheses, Pasts
 from stseg.io.runfile.runs import Run, read_run
-from stseg.records.tables import APPEARANCE
 from stseg.tracking.row_groups import isolated_tracklets
 
 MODEL = SizeModel(
@@ -36,7 +35,7 @@ LONGEST = 1.0
 
 
 def seen_of(rows: Rows) -> Observations:
-    return observe(rows, rows["height"][:, None].astype(float), MODEL, RATE, BORDER, CONFIG)
+    return observe(rows, [rows["height"].astype(float)], MODEL, RATE, BORDER, CONFIG)
 
 
 def found(seen: Observations, lag: float = 60.0, hypotheses: int = 400) -> Ints:
@@ -103,7 +102,7 @@ def test_outliers_say_no_more_against_a_person_than_they_may(most: float, low: l
     rows = rows_of({k: (straight(-1, 0.5 * k, 0.5, 0), 1.7 + 0.1 * k, range(20)) for k in (1, 2)}, noise=0.0)
     rows["xx"] = rows["yy"] = 0.02
     rows["height"][np.flatnonzero(rows["id"] == 1)[10 : 10 + len(low)]] = low
-    seen = observe(rows, rows["height"][:, None].astype(float), MODEL, RATE, BORDER, CONFIG)
+    seen = observe(rows, [rows["height"].astype(float)], MODEL, RATE, BORDER, CONFIG)
     model = replace(MODEL, most_against=np.full(1, most))
     found = search_identities(seen, model, CONFIG.motion, SearchLimits(50, LONGEST, 60.0)).name
     assert len(np.unique(found)) == people
@@ -123,7 +122,7 @@ def test_noise_and_spread_of_a_size_are_learned_from_enough() -> None:
 
 def identities(rows: Rows, constraints: Constraints) -> Ints:
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    problem = IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, constraints)
+    problem = IdentityProblem.of(rows, sizes, (), RATE, BORDER, CONFIG, constraints)
     return associate_globally(rows, problem, constraints).identity
 
 

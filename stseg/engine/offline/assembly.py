@@ -1,7 +1,7 @@
 """Assembly of the run file from the segment files: stitched tracks of the whole run, and the volume with their ids."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
 from stseg.io.runfile.runs import Run, RunWriter, read_run
-from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks
+from stseg.records.tables import EVENT, TRAJECTORY, Tracks
 from stseg.trackers import find_tracker
 from stseg.tracking.segment_stitching import SegmentTracks, Stitcher, renamed_labels
 from stseg.trajectories.final_tracks import FinalTracks, box_parts
@@ -67,8 +67,6 @@ class _StitchedRun:
     segments: list[_StitchedSegment]
     events: Rows
     """EVENT (k,)."""
-    appearance: Rows
-    """APPEARANCE (l,)."""
     known_people: Rows
     """KNOWN_PERSON (m,)."""
 
@@ -80,6 +78,21 @@ class _StitchedRun:
             rows[start : start + part.length] = part.named(part.read())
             start += part.length
         return rows
+
+    @property
+    def appearance_parts(self) -> "_Appearance":
+        """APPEARANCE (l,) of each segment."""
+        return _Appearance(self.segments)
+
+
+@dataclass(frozen=True)
+class _Appearance:
+    """Appearance of a run, read from its segments each time that it is gone through."""
+
+    segments: list[_StitchedSegment]
+
+    def __iter__(self) -> Iterator[Rows]:
+        return (read_run(part.path).appearance for part in self.segments)
 
 
 class _Association(NamedTuple):
@@ -130,15 +143,14 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
 def _associated(job: Job, finished: Sequence[FinishedSegment]) -> _Association:
     stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = finished[0].segment.first if finished else 0
-    segments, events, appearance = list[_StitchedSegment](), [np.zeros(0, EVENT)], [np.zeros(0, APPEARANCE)]
+    segments, events = list[_StitchedSegment](), [np.zeros(0, EVENT)]
     for segment, path in finished:
         run = read_run(path)
         found = stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
         segments.append(_StitchedSegment(segment.first, path, found.names, len(found.committed)))
         events.append(found.events)
-        appearance.append(run.appearance)
-    rows = _StitchedRun(segments, np.concatenate(events), np.concatenate(appearance), job.known)
+    rows = _StitchedRun(segments, np.concatenate(events), job.known)
     tracks = finished_tracks(job.read.reduced_rig, job.config, find_tracker(job.tracker), rows)
     return _Association(segments, rows.events, tracks)
 

@@ -13,7 +13,7 @@ less than differences within tracklets say. Where appearance is no better than c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.identities.evidence.appearance_axes import WRONG, Axes, discriminant_axes, independent_frames
 from stseg.identities.evidence.size_model import SizeModel, SizePrior, measured_tracklets
 from stseg.noise.lasting_error import constant_errors
+from stseg.records.tables import APPEARANCE
 
 _LEAST_FRAMES = 8
 """Least frames of half a person's time."""
@@ -69,48 +70,85 @@ def learn_appearance(
     return LearnedAppearance(value, SizeModel.joined([one.model for one in found]), found[-1].colours)
 
 
-def row_looks(trajectory: Rows, appearance: Rows) -> list[Floats]:
+def row_looks(trajectory: Rows, appearance: Iterable[Rows]) -> list[Floats]:
     """Features and colours of each row, see `row_means`."""
     return [row_means(trajectory, appearance, name) for name in ("features", "colours")]
 
 
-def row_means(trajectory: Rows, appearance: Rows, name: str) -> Floats:
-    """Mean over views of each row's appearance, less the cameras' offsets, float64 (n, k); nan where unknown."""
-    measured = np.flatnonzero(np.isfinite(appearance[name]).all(axis=1))
-    value, view = appearance[name][measured].astype(np.float64), appearance["view"][measured].astype(np.int64)
-    detection, number, row = _rows_of(trajectory, appearance, measured)
-    mean = np.full((len(trajectory), value.shape[1]), np.nan)
-    if len(value):
-        value -= _offsets(value, view, detection)[view]
-        total = np.stack([np.bincount(detection, column, len(number)) for column in value.T], axis=1)
-        mean[row[row >= 0]] = (total / number[:, None])[row >= 0]
+def row_means(trajectory: Rows, appearance: Iterable[Rows], name: str) -> Floats:
+    """Mean over views of each row's appearance, less the cameras' offsets, float64 (n, k); nan where unknown.
+
+    `appearance` are parts, APPEARANCE (l,) each, of successive frames. They are gone through twice.
+    """
+    order = np.argsort(trajectory["frame"], kind="stable")
+    frames, unknown = trajectory["frame"][order], (len(trajectory), *APPEARANCE[name].shape)
+    offsets = _offsets([_Appearances.of(part, name).offset_equations() for part in appearance])
+    if not len(offsets):
+        return np.broadcast_to(np.nan, unknown)
+    mean = np.full(unknown, np.nan)
+    for known in (_Appearances.of(part, name) for part in appearance):
+        if len(known.value):
+            rows = order[slice(*frames.searchsorted(known.places["frame"][[0, -1]] + [0, 1]))]
+            detection, row = _same(known.places, _places(trajectory[rows], "raw_x", "raw_y"))
+            mean[rows[row]] = known.mean(known.value - offsets[known.view])[detection]
     return mean
 
 
-def _rows_of(trajectory: Rows, appearance: Rows, measured: Ints) -> tuple[Ints, Ints, Ints]:
-    """Detection of each known appearance row, how many each has, and the trajectory row of each, -1 for none."""
-    key = [("frame", "<i8"), ("x", "<f8"), ("y", "<f8")]
-    detected = np.zeros(len(measured), key)
-    placed = np.zeros(len(trajectory), key)
-    for name, raw in (("frame", "frame"), ("x", "raw_x"), ("y", "raw_y")):
-        detected[name], placed[name] = appearance[name][measured], trajectory[raw]
-    detections, detection, number = np.unique(detected, return_inverse=True, return_counts=True)
-    order = np.argsort(placed, kind="stable")
-    at = np.searchsorted(placed[order], detections).clip(max=max(len(placed) - 1, 0))
-    row = np.where(placed[order][at] == detections, order[at], -1) if len(placed) else np.full(len(detections), -1)
-    return detection.reshape(-1), number, row
+@dataclass(frozen=True)
+class _Appearances:
+    """Known appearances of the detections of some frames."""
+
+    value: Floats
+    """float64 (n, k): features or colours by one view."""
+    view: Ints
+    detection: Ints
+    """int64 (n,): camera, and index in `places`, of each."""
+    places: Rows
+    """Frame and place of each detection, sorted, see `_places`."""
+
+    @classmethod
+    def of(cls, appearance: Rows, name: str) -> _Appearances:
+        """Features or colours in APPEARANCE (l,), as far as they are known."""
+        rows = appearance[np.isfinite(appearance[name]).all(axis=1)]
+        places, detection = np.unique(_places(rows, "x", "y"), return_inverse=True)
+        return cls(rows[name].astype(np.float64), rows["view"].astype(np.int64), detection.reshape(-1), places)
+
+    def mean(self, value: Floats) -> Floats:
+        """Mean over the views of each detection, float64 (detection, k)."""
+        number = np.bincount(self.detection)
+        return np.stack([np.bincount(self.detection, column) / number for column in value.T], axis=1)
+
+    def offset_equations(self) -> tuple[Floats, Floats]:
+        """Normal matrix (view, view) and right sides (view, k) of the cameras' offsets, by least squares."""
+        views = int(self.view.max(initial=-1)) + 1
+        inside = np.zeros((len(self.places), views))
+        inside[self.detection, self.view] = 1.0
+        normal = np.diag(inside.sum(axis=0)) - (inside / inside.sum(axis=1, keepdims=True)).T @ inside
+        rest = (self.value - self.mean(self.value)[self.detection]).T
+        return normal, np.stack([np.bincount(self.view, column, views) for column in rest], axis=1)
 
 
-def _offsets(value: Floats, view: Ints, detection: Ints) -> Floats:
+def _places(rows: Rows, x: str, y: str) -> Rows:
+    """Frame and place of each row, by which a detection and its row of the trajectory are found."""
+    places = np.empty(len(rows), [("frame", "<i8"), ("x", "<f8"), ("y", "<f8")])
+    places["frame"], places["x"], places["y"] = rows["frame"], rows[x], rows[y]
+    return places
+
+
+def _same(places: Rows, others: Rows) -> tuple[Ints, Ints]:
+    """Indices of equal elements of two arrays, the first sorted and without repetitions: int64 (m,) each."""
+    at = places.searchsorted(others).clip(max=len(places) - 1)
+    other = np.flatnonzero(places[at] == others)
+    return at[other], other
+
+
+def _offsets(equations: Sequence[tuple[Floats, Floats]]) -> Floats:
     """Offset of each camera (view, k), least squares over people that several cameras see at once; their sum is 0."""
-    views = int(view.max()) + 1
-    inside = np.zeros((int(detection.max()) + 1, views))
-    inside[detection, view] = 1.0
-    number = inside.sum(axis=1)
-    normal = np.diag(inside.sum(axis=0)) - (inside / number[:, None]).T @ inside
-    mean = np.stack([np.bincount(detection, column) for column in value.T], axis=1) / number[:, None]
-    columns = zip(value.T, mean.T, strict=True)
-    right = np.stack([np.bincount(view, column - middle[detection], views) for column, middle in columns], axis=1)
+    views = max((len(normal) for normal, _ in equations), default=0)
+    if not views:
+        return np.zeros((0, 0))
+    normal = sum(np.pad(part, (0, views - len(part))) for part, _ in equations)
+    right = sum(np.pad(sides, ((0, views - len(sides)), (0, 0))) for _, sides in equations)
     return np.asarray(np.linalg.pinv(normal, rcond=1e-9, hermitian=True) @ right)
 
 

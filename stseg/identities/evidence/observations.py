@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -82,18 +83,18 @@ class Observations:
 
 
 def observe(
-    trajectory: Rows, sizes: Floats, model: SizeModel, frame_rate: float, border: Border, config: Config
+    trajectory: Rows, sizes: Sequence[Floats], model: SizeModel, frame_rate: float, border: Border, config: Config
 ) -> Observations:
     """Observations of a trajectory, TRAJECTORY (n,) in any order.
 
-    `sizes` float64 (n, size) are those of each row, nan where unmeasured, `model` their noise and spread. `frame_rate`
-    is in frames per second; people come and go at the border; `config` holds the constants of all stages.
+    `sizes`, float64 (n,) each, are those of each row, nan where unmeasured, `model` their noise and spread.
+    `frame_rate` is in frames per second; people come and go at the border; `config` holds the constants of all stages.
     """
     order = np.lexsort((trajectory["id"], trajectory["frame"]))
     frame, track = trajectory["frame"][order], trajectory["id"][order]
     frames, start = np.unique(frame, return_index=True)
     ground = np.column_stack([trajectory["x"][order], trajectory["y"][order]])
-    precision, information = model.evidence(sizes[order])
+    precision, information = model.evidence(sizes, order)
     alike = PLACE_ERROR.row_variance(frame_rate)
     variance = np.maximum(alike * (trajectory["xx"] + trajectory["yy"])[order] / 2, _LEAST_PLACE_ERROR**2)
     previous, inside = _previous(frame, track), border.inside(ground, config.detection.border_width)

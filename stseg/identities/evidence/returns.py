@@ -221,7 +221,7 @@ def known_people(committed: Rows, appearance: Rows) -> Rows:
     table = np.zeros(len(people), KNOWN_PERSON)
     table["id"] = people
     table["height"], table["height_count"] = _means(committed["height"][:, None], owner, len(people), 0)
-    colours = row_means(committed, appearance, "colours")
+    colours = row_means(committed, (appearance,), "colours")
     table["colours"], table["appearance_count"] = _means(colours, owner, len(people))
     return table
 

@@ -79,12 +79,19 @@ class SizeModel:
         names = ("mean", "variance", "row_variance", "spread", "most_against")
         return cls(*(np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)]) for name in names))
 
-    def evidence(self, sizes: Floats) -> tuple[Floats, Floats]:
-        """Precision of each measured size (n, size), and precision times deviation; 0 where unmeasured or too far."""
-        deviation = np.nan_to_num(sizes - self.mean, nan=np.inf)
-        measured = np.abs(deviation) < _FARTHEST * np.sqrt(self.variance + self.spread)
-        precision = np.where(measured, 1.0 / self.row_variance, 0.0)
-        return precision, np.where(measured, deviation, 0.0) * precision
+    def evidence(self, sizes: Sequence[Floats], rows: Ints | slice = slice(None)) -> tuple[Floats, Floats]:
+        """Precision of each measured size of some rows, and precision times deviation, float64 (row, size) each.
+
+        `sizes` are float64 (n,) each. Both are 0 where a size is unmeasured or too far.
+        """
+        number = len(sizes[0][rows])
+        precision, information = np.zeros((number, len(sizes))), np.zeros((number, len(sizes)))
+        for k, farthest in enumerate(_FARTHEST * np.sqrt(self.variance + self.spread)):
+            deviation = sizes[k][rows] - self.mean[k]
+            measured = np.flatnonzero(np.abs(deviation) < farthest)  # nan is not
+            precision[measured, k] = 1.0 / self.row_variance[k]
+            information[measured, k] = deviation[measured] * precision[measured, k]
+        return precision, information
 
 
 def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], frame_rate: float) -> SizeModel:
