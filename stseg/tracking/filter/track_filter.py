@@ -28,7 +28,8 @@ _SIZE_DRIFT = 0.002
 DETECTED_LOG_ODDS = 1.0
 """Greatest log-odds that a person detected in one frame is detected in the next, nats; of a new track."""
 _STANDING_LOG_ODDS, _STANDING_TIME = 1.0, 10.0
-"""Growth of these while a track stands, nats, and its duration, seconds: ghosts last for less, and people stay."""
+"""Growth of these while a track stands, nats, and its duration, seconds: ghosts last for less, and people stay. With
+fewer than `_SURE_VIEWS` there is none: a ghost of two views lasts as long as the people who cast it."""
 _LEAST_ODDS = -6.0
 """Log-odds below which a rejected candidate starts no tentative track, nats."""
 _REPEATED_EVIDENCE = 2.0
@@ -208,7 +209,8 @@ class TrackFilter:
                 track, before = self._birth(frame, people, j).resized(heights[j], widths[j]), self.birth_log_odds
             if track.track == 0:
                 self.issued += 1
-            odds = min(float(before + people.evidence[j] - people.prior[j]), self._greatest_odds(track, frame))
+            greatest = self._greatest_odds(track, frame, len(people.view_evidence))
+            odds = min(float(before + people.evidence[j] - people.prior[j]), greatest)
             detected.append(track._replace(track=track.track or self.issued, odds=odds))
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
@@ -218,9 +220,9 @@ class TrackFilter:
         self._expected = (-1, [])
         return names
 
-    def _greatest_odds(self, track: TrackState, frame: int) -> float:
-        """Greatest log-odds of a track that a frame detected, nats."""
-        seconds = (frame - track.first_seen) / self.frame_rate
+    def _greatest_odds(self, track: TrackState, frame: int, views: int) -> float:
+        """Greatest log-odds of a track that a frame of so many views detected, nats."""
+        seconds = (frame - track.first_seen) / self.frame_rate if views >= _SURE_VIEWS else 0.0
         return DETECTED_LOG_ODDS + _STANDING_LOG_ODDS * min(seconds / _STANDING_TIME, 1.0)
 
     def _undetected(self, frame: int, people: People) -> list[int]:
