@@ -147,11 +147,9 @@ def find_stream_delay(
         misfit = np.array([_misfit(tables[view], view, boxes_by_frame, located, shift) for shift in shifts])
         if not np.isfinite(misfit).all():
             continue
-        best = int(misfit.argmin())
-        if misfit[best] < clearest * misfit[most] and _is_lasting(
-            tables[view], view, boxes_by_frame, located, shifts[best]
-        ):
-            clearest, found = float(misfit[best] / misfit[most]), StreamDelay(view, shifts[best])
+        share, delay = float(misfit.min() / misfit[most]), shifts[int(misfit.argmin())]
+        if share < clearest and _is_lasting(tables[view], view, boxes_by_frame, located, delay):
+            clearest, found = share, StreamDelay(view, delay)
     return found
 
 
