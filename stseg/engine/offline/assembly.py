@@ -43,6 +43,7 @@ class _StitchedSegment:
     """A finished segment, and the names of its tracks in the run."""
 
     first: int
+    """First frame that it commits."""
     path: Path
     names: Ints
     """int64 (track,): by the name in the segment."""
