@@ -35,6 +35,7 @@ GHOSTS = found(people())
 NOTHING = Measurement(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
 """Place of a person in a frame: x, y, height in metres; None where the frame does not see them."""
+NOT_SOUGHT = [(-1, 2, 2, 2), (-5, 2, 2, 1), (-1, 0.4, 2, 1), (-1, 0.4, 0, 2), (-1, 0.3, 0, 1)]
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
 
 
@@ -210,8 +211,7 @@ def test_odds_fall_while_out_of_sight_until_patience_ends() -> None:
     for frames, most in ((10, 1 + 9 / 80), (99, 2.0)):  # whoever is seen may leave all the same
         just_seen = follow([walk(0, 0, 0.3, 0)], range(frames))[1].predict(frames)
         assert just_seen is not None and just_seen.existence[0] == pytest.approx(most)
-    patience = round(IDENTITY.patience * RATE)
-    for gone, left in ((patience, 1), (patience + 1, 0)):
+    for gone, left in ((patience := round(IDENTITY.patience * RATE), 1), (patience + 1, 0)):
         _, track_filter = follow([except_for(walk(0, 0, 0, 0), range(10, 99))], range(10 + gone))
         assert len(track_filter.tracks) == left
     (chains,), _ = follow([except_for(walk(0, 0, 0, 0), range(10, 11 + patience))], range(40))
@@ -238,11 +238,11 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
         assert track_filter.issued == len(track_filter.tracks) == int(found_again)
 
 
-@pytest.mark.parametrize(("evidence", "place", "looked_for"), [(-1, 2, 2), (-5, 2, 1), (-1, 0.3, 1)])
-def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
+@pytest.mark.parametrize(("evidence", "place", "repeated", "looked_for"), NOT_SOUGHT)
+def test_who_is_not_looked_for_again(evidence: float, place: float, repeated: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
-    track_filter = TrackFilter(RATE, CONFIG)
-    track_filter.update(0, found(people((0, 0))), found(people((place, 0.0)), evidence=evidence), 2.0)
+    track_filter, almost = TrackFilter(RATE, CONFIG), found(people((place, 0.0)), evidence=evidence)
+    track_filter.update(0, found(people((0, 0))), almost, repeated)
     assert len(track_filter.predict(1) or ()) == looked_for
     assert [track.track for track in track_filter.tracks] == [1, 0][:looked_for]
 
