@@ -24,7 +24,7 @@ from stseg.tracking.filter.track_filter import (
     PlacePosterior,
     TrackFilter,
     TrackState,
-    repeated_evidence,
+    any_boxes,
 )
 from stseg.trajectories.smoother import smoothed_paths
 
@@ -35,14 +35,14 @@ GHOSTS = found(people())
 NOTHING = Measurement(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
 """Place of a person in a frame: x, y, height in metres; None where the frame does not see them."""
-NOT_SOUGHT = [(-1, 2, 2, 2), (-5, 2, 2, 1), (-1, 0.4, 2, 1), (-1, 0.4, 0, 2), (-1, 0.3, 0, 1)]
+NOT_SOUGHT = [(-1, 2, True, 2), (-5, 2, True, 1), (-1, 0.4, True, 1), (-1, 0.4, False, 2), (-1, 0.3, False, 1)]
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
 
 
 def track_state(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> TrackState:
     spread = np.diag([0.03, 0.02, 0.6, 0.5, 1.0, 0.9])
     spread[0, 2] = spread[2, 0] = spread[1, 3] = spread[3, 1] = 0.05
-    return TrackState(3, 9, 10, np.array([*state, 0.2, -0.1]), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
+    return TrackState(3, 9, 10, 10, np.array([*state, 0.2, -0.1]), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
 
 
 @drawn(100, STATES, numbers(0.01, 3), numbers(0.01, 3))
@@ -227,7 +227,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     ]
     for found_again, view, views, odds in cases:
         track_filter, almost = TrackFilter(RATE, CONFIG), found(people((0.5, 0.5)), evidence=-1.0, views=views)
-        assert track_filter.update(0, GHOSTS, almost, repeated_evidence([None, view])).shape == (0,)
+        assert track_filter.update(0, GHOSTS, almost, any_boxes([None, view])).shape == (0,)
         expected = track_filter.predict(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
@@ -238,13 +238,25 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
         assert track_filter.issued == len(track_filter.tracks) == int(found_again)
 
 
-@pytest.mark.parametrize(("evidence", "place", "repeated", "looked_for"), NOT_SOUGHT)
-def test_who_is_not_looked_for_again(evidence: float, place: float, repeated: float, looked_for: int) -> None:
+@pytest.mark.parametrize(("evidence", "place", "has_boxes", "looked_for"), NOT_SOUGHT)
+def test_who_is_not_looked_for_again(evidence: float, place: float, has_boxes: bool, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
     track_filter, almost = TrackFilter(RATE, CONFIG), found(people((place, 0.0)), evidence=evidence)
-    track_filter.update(0, found(people((0, 0))), almost, repeated)
+    track_filter.update(0, found(people((0, 0))), almost, has_boxes)
     assert len(track_filter.predict(1) or ()) == looked_for
     assert [track.track for track in track_filter.tracks] == [1, 0][:looked_for]
+
+
+@pytest.mark.parametrize(("has_boxes", "place", "change"), [(True, 0.2, -2.5), (True, 0.4, 0.0), (False, 0.2, 0.0)])
+def test_boxes_are_evidence_of_a_track_that_they_reject(has_boxes: bool, place: float, change: float) -> None:
+    track_filter, nobody = TrackFilter(RATE, CONFIG), found(people((place, 0.0)), evidence=-2.5)
+    track_filter.update(0, found(people((0, 0))), GHOSTS)
+    expected = track_filter.predict(1)
+    track_filter.update(1, GHOSTS, nobody, has_boxes)
+    after = track_filter.predict(2)
+    assert expected is not None and after is not None
+    decay = 0.0 if change else -4.0 / RATE
+    assert after.existence[0] - expected.existence[0] == pytest.approx(change + decay)
 
 
 MOTION = MotionConfig()
