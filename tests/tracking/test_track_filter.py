@@ -24,7 +24,7 @@ from stseg.tracking.filter.track_filter import (
     PlacePosterior,
     TrackFilter,
     TrackState,
-    any_boxes,
+    repeated_evidence,
 )
 from stseg.trajectories.smoother import smoothed_paths
 
@@ -35,14 +35,14 @@ GHOSTS = found(people())
 NOTHING = Measurement(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
 """Place of a person in a frame: x, y, height in metres; None where the frame does not see them."""
-NOT_SOUGHT = [(-1, 2, True, 2), (-5, 2, True, 1), (-1, 0.4, True, 1), (-1, 0.4, False, 2), (-1, 0.3, False, 1)]
+NOT_SOUGHT = [(-1, 2, 2, 2), (-5, 2, 2, 1), (-1, 0.4, 2, 1), (-1, 0.4, 0, 2), (-1, 0.3, 0, 1)]
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
 
 
 def track_state(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> TrackState:
     spread = np.diag([0.03, 0.02, 0.6, 0.5, 1.0, 0.9])
     spread[0, 2] = spread[2, 0] = spread[1, 3] = spread[3, 1] = 0.05
-    return TrackState(3, 9, 10, 10, np.array([*state, 0.2, -0.1]), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
+    return TrackState(3, 9, 10, np.array([*state, 0.2, -0.1]), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
 
 
 @drawn(100, STATES, numbers(0.01, 3), numbers(0.01, 3))
@@ -105,7 +105,8 @@ def test_sizes_converge_and_what_frames_tell_is_used_once() -> None:
     later = track.predicted(4.0, CONFIG.motion)  # shoes, stoop, lens, clothes
     assert later.height_variance > track.height_variance and later.width_variance > track.width_variance
     # The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in.
-    track_filter, tracks = TrackFilter(RATE, CONFIG), found(people((0.0, 0.0, 1.85)))
+    track_filter = TrackFilter(RATE, CONFIG)
+    tracks = found(people((0.0, 0.0, 1.85)))
     nothing = replace(tracks, sizes=Sizes.of_population(1, CONFIG.body))
     track_filter.update(0, tracks, GHOSTS)
     known = track_filter.tracks[0]
@@ -146,7 +147,8 @@ def test_walkers_are_expected_ahead_and_after_empty_frames() -> None:
     for ahead in (20, 24):
         expected = track_filter.predict(ahead)
         assert expected is not None
-        np.testing.assert_allclose(expected.ground, [[-3 + 1.2 * ahead / RATE, 1 - 0.4 * ahead / RATE]], atol=0.03)
+        there = np.array([[-3 + 1.2 * ahead / RATE, 1 - 0.4 * ahead / RATE]])
+        np.testing.assert_allclose(expected.ground, there, atol=0.03)
     (track,) = track_filter.tracks
     np.testing.assert_allclose(track.state[2:4], [1.2, -0.4], atol=0.03)
     track_filter = TrackFilter(RATE, CONFIG)
@@ -197,9 +199,12 @@ def test_who_turns_or_hides_is_the_same_and_far_away_is_new() -> None:
 
 def test_odds_fall_while_out_of_sight_until_patience_ends() -> None:
     _, track_filter = follow([except_for(walk(0, 0, 0.3, 0), range(10, 99))], range(14))
-    after = [expected for frame in range(14, 18) if (expected := track_filter.predict(frame))]
-    odds = [float(expected.existence[0]) for expected in after]
-    spread = [float(np.linalg.det(expected.covariance[0])) for expected in after]
+    odds, spread = [], []
+    for frame in range(14, 18):
+        expected = track_filter.predict(frame)
+        assert expected is not None
+        odds.append(float(expected.existence[0]))
+        spread.append(float(np.linalg.det(expected.covariance[0])))
     np.testing.assert_allclose(np.diff(odds), odds[1] - odds[0])
     assert odds[0] > odds[1]
     assert (np.diff(spread) > 0).all()
@@ -222,7 +227,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     ]
     for found_again, view, views, odds in cases:
         track_filter, almost = TrackFilter(RATE, CONFIG), found(people((0.5, 0.5)), evidence=-1.0, views=views)
-        assert track_filter.update(0, GHOSTS, almost, any_boxes([None, view])).shape == (0,)
+        assert track_filter.update(0, GHOSTS, almost, repeated_evidence([None, view])).shape == (0,)
         expected = track_filter.predict(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
@@ -233,22 +238,13 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
         assert track_filter.issued == len(track_filter.tracks) == int(found_again)
 
 
-@pytest.mark.parametrize(("evidence", "place", "has_boxes", "looked_for"), NOT_SOUGHT)
-def test_who_is_not_looked_for_again(evidence: float, place: float, has_boxes: bool, looked_for: int) -> None:
+@pytest.mark.parametrize(("evidence", "place", "repeated", "looked_for"), NOT_SOUGHT)
+def test_who_is_not_looked_for_again(evidence: float, place: float, repeated: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
     track_filter, almost = TrackFilter(RATE, CONFIG), found(people((place, 0.0)), evidence=evidence)
-    track_filter.update(0, found(people((0, 0))), almost, has_boxes)
+    track_filter.update(0, found(people((0, 0))), almost, repeated)
     assert len(track_filter.predict(1) or ()) == looked_for
     assert [track.track for track in track_filter.tracks] == [1, 0][:looked_for]
-
-
-@pytest.mark.parametrize(("has_boxes", "place", "change"), [(True, 0.2, -2.5), (True, 0.4, 0.0), (False, 0.2, 0.0)])
-def test_boxes_are_evidence_of_a_track_that_they_reject(has_boxes: bool, place: float, change: float) -> None:
-    track_filter, rejected = TrackFilter(RATE, CONFIG), found(people((place, 0.0)), evidence=-2.5)
-    track_filter.update(0, found(people((0, 0))), GHOSTS)
-    before = track_filter.tracks[0].odds
-    track_filter.update(1, GHOSTS, rejected, has_boxes)
-    assert track_filter.tracks[0].odds == pytest.approx(before + change)
 
 
 MOTION = MotionConfig()
@@ -268,6 +264,10 @@ def walks(noise: Floats) -> tuple[Floats, Floats]:
         turn = rng.multivariate_normal(np.zeros(4), process_noise(SECONDS, MOTION), WALKS)
         state = state @ transition(SECONDS).T + turn
     return true, true + rng.multivariate_normal(np.zeros(2), noise, (WALKS, STEPS))
+
+
+def square(off: Floats, covariance: Floats) -> float:
+    return float(off @ np.linalg.solve(covariance, off))
 
 
 def of_the_kalman_tracker(measured: Floats, noise: Floats) -> list[float]:
@@ -319,7 +319,7 @@ def test_smoothed_places_err_by_as_much_as_claimed() -> None:
     measured = true + lasting_errors(NOISE, WALKS, STEPS, SECONDS)
     paths = [smoothed_paths(seconds, path, noise, [np.arange(STEPS)], MOTION) for path in measured]
     pairs = [one for path, real in zip(paths, true, strict=True) for one in zip(path[0] - real, path[1], strict=True)]
-    squares = [float(off @ np.linalg.solve(covariance, off)) for off, covariance in pairs]
+    squares = [square(off, covariance) for off, covariance in pairs]
     assert np.mean(squares) == pytest.approx(2.0, abs=4 * 2 / np.sqrt(WALKS))
     # Rows that err alike are worth far less than as many independent ones.
     assert np.mean([np.trace(path[1][STEPS // 2]) for path in paths]) > 0.5 * np.trace(NOISE)

@@ -42,10 +42,8 @@ _NUMBERS_OF_BRANCH = 10_000
 EXCLUSION_RADIUS = 0.5
 """Radius around existing tracks within which no place is interpolated, metres, and no tentative track begins whose
 evidence repeats itself."""
-_BODY_RADIUS = 0.35
-"""Radius around a track's place within which a candidate is the same body, metres: in a crowd people nearly touch."""
-_NO_ROOM = -100.0
-"""Evidence below which a candidate stands within a member, nats."""
+_SURE_RADIUS = 0.35
+"""The same of tentative tracks with evidence that adds up in full, metres: in a crowd people nearly touch."""
 
 
 class Measurement(NamedTuple):
@@ -96,8 +94,6 @@ class TrackState(NamedTuple):
     first_seen: int
     last_seen: int
     """Frames of the first and the last detection."""
-    last_judged: int
-    """Last frame with evidence for or against it."""
     state: Floats
     covariance: Floats
     """float64 (6,) and (6, 6): x, y, vx, vy in metres and metres per second, and the lasting part of the body's
@@ -108,7 +104,7 @@ class TrackState(NamedTuple):
     width_variance: float
     """Body height and width, metres, and their variances, square metres."""
     odds: float
-    """Log-odds of existence after that frame, nats."""
+    """Log-odds of existence, nats."""
 
     def predicted(self, seconds: float, model: MotionConfig) -> TrackState:
         """The state some seconds after the last detection."""
@@ -194,10 +190,10 @@ class TrackFilter:
             np.array([t.odds for t in predicted]),
         )
 
-    def update(self, frame: int, people: People, ghosts: People, has_boxes: bool = False) -> Ints:
+    def update(self, frame: int, people: People, ghosts: People, repeated: float = 0.0) -> Ints:
         """The track of each detection of a frame that was explained with `predict` as its prior.
 
-        `has_boxes` says whether any view delivers boxes (`any_boxes`).
+        `repeated` is the part of the ghosts' evidence that the next frame repeats (`repeated_evidence`), nats.
 
         Returns
         -------
@@ -218,30 +214,14 @@ class TrackFilter:
                 self.issued += 1
             greatest = self._greatest_odds(track, frame, len(people.view_evidence))
             odds = min(float(before + people.evidence[j] - people.prior[j]), greatest)
-            detected.append(track._replace(track=track.track or self.issued, last_judged=frame, odds=odds))
+            detected.append(track._replace(track=track.track or self.issued, odds=odds))
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = self._grounds([*detected, *(predicted[k] for k in missed)])
-        tentative = self._tentative(frame, ghosts, has_boxes, standing)
-        undetected = [self.tracks[k] for k in missed]
-        if has_boxes:
-            undetected = [self._judged(frame, self.tracks[k], predicted[k], ghosts) for k in missed]
-        self.tracks = [*detected, *undetected, *tentative]
+        tentative = self._tentative(frame, ghosts, repeated, standing)
+        self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
         return names
-
-    def _judged(self, frame: int, track: TrackState, predicted: TrackState, ghosts: People) -> TrackState:
-        """An undetected track after a frame of boxes: the evidence for the best candidate at its place adds up, too.
-
-        Where none has room beside the people of the frame, the frame says nothing of the track. Silhouettes do not add
-        up so: who is lost in a crowd is hidden in the same way for seconds.
-        """
-        near = distances(self._grounds([predicted]), ghosts.ground)[0] < _BODY_RADIUS
-        gain = float((ghosts.evidence - ghosts.prior)[near].max(initial=-np.inf))
-        if gain < _NO_ROOM:
-            return track
-        greatest = self._greatest_odds(track, frame, len(ghosts.view_evidence))
-        return track._replace(last_judged=frame, odds=min(predicted.odds + gain, greatest))
 
     def _greatest_odds(self, track: TrackState, frame: int, views: int) -> float:
         """Greatest log-odds of a track that a frame of so many views detected, nats."""
@@ -272,18 +252,17 @@ class TrackFilter:
 
     def _predicted(self, track: TrackState, frame: int) -> TrackState:
         seconds = (frame - track.last_seen) / self.frame_rate
-        unjudged = (frame - track.last_judged - 1) / self.frame_rate
-        return track.predicted(seconds, self.motion)._replace(odds=track.odds - EXISTENCE_DECAY * unjudged)
+        undetected = seconds - 1 / self.frame_rate
+        return track.predicted(seconds, self.motion)._replace(odds=track.odds - EXISTENCE_DECAY * undetected)
 
-    def _tentative(self, frame: int, ghosts: People, has_boxes: bool, standing: Floats) -> list[TrackState]:
+    def _tentative(self, frame: int, ghosts: People, repeated: float, standing: Floats) -> list[TrackState]:
         """Tentative tracks of rejected candidates: evidence adds up if the next frame shows them again.
 
         None begins near the places of other tracks, `standing` float64 (n, 2), metres.
         """
         by_few = (ghosts.view_evidence != 0).sum(0) < _SURE_VIEWS
-        repeats = by_few | has_boxes
-        odds = ghosts.evidence - np.where(repeats, _REPEATED_EVIDENCE, 0.0)
-        radius = np.where(repeats, EXCLUSION_RADIUS, _BODY_RADIUS)
+        repeats = np.where(by_few, _REPEATED_EVIDENCE, repeated)
+        odds, radius = ghosts.evidence - repeats, np.where(repeats > 0, EXCLUSION_RADIUS, _SURE_RADIUS)
         excluded = distances(ghosts.ground, standing).min(1, initial=np.inf) < radius
         return [
             self._birth(frame, ghosts, j)._replace(odds=float(odds[j]))
@@ -299,12 +278,12 @@ class TrackFilter:
         spread[:2, 4:] = spread[4:, :2] = -stray
         state, prior = np.append(people.ground[j], np.zeros(4)), self.body
         sizes = (prior.height_mean, prior.height_spread**2, prior.width_mean, prior.width_spread**2)
-        return TrackState(0, frame, frame, frame, state, spread, *sizes, 0.0)
+        return TrackState(0, frame, frame, state, spread, *sizes, 0.0)
 
 
-def any_boxes(evidence: Sequence[ViewEvidence]) -> bool:
-    """Whether any view of a frame delivers boxes."""
-    return any(isinstance(view, Boxes) for view in evidence)
+def repeated_evidence(evidence: Sequence[ViewEvidence]) -> float:
+    """Part of a rejected candidate's evidence that the next frame repeats where `_SURE_VIEWS` bear it, nats."""
+    return _REPEATED_EVIDENCE if any(isinstance(view, Boxes) for view in evidence) else 0.0
 
 
 def _measurements(size: Floats, noise: float) -> list[Measurement]:
