@@ -49,7 +49,7 @@ def main(folder: Path, output: Path) -> None:
     cameras = tuple(fit_camera(f"c{k}", *read_rectangles(folder / "test.pom", k)) for k in range(2))
     sources = tuple(CameraSource(Source("masks", folder / "images" / f"view-f*-c{k}.png")) for k in range(2))
     grid = Grid((0.0, CELL * (ROW - 1)), (0.0, CELL * (ROWS - 1)))
-    write_rig(output, Recording(output, Rig("pom", FRAME_RATE, grid, cameras), sources))
+    write_rig(output, Recording(output, Rig("pom", FRAME_RATE, grid, cameras), sources), overwrite=True)
     print(f"wrote {output}")
 
 
