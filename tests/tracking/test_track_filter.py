@@ -35,7 +35,7 @@ GHOSTS = found(people())
 NOTHING = Measurement(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
 """Place of a person in a frame: x, y, height in metres; None where the frame does not see them."""
-NOT_SOUGHT = [(-1, 2, 2, 2), (-5, 2, 2, 1), (-1, 0.4, 2, 1), (-1, 0.4, 0, 2), (-1, 0.3, 0, 1)]
+TENTATIVE = [(-1, 2, 2, 2), (-5, 2, 2, 1), (-1, 0.4, 2, 1), (-1, 0.4, 0, 2), (-1, 0.3, 0, 1)]
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
 
 
@@ -238,7 +238,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
         assert track_filter.issued == len(track_filter.tracks) == int(found_again)
 
 
-@pytest.mark.parametrize(("evidence", "place", "repeated", "looked_for"), NOT_SOUGHT)
+@pytest.mark.parametrize(("evidence", "place", "repeated", "looked_for"), TENTATIVE)
 def test_who_is_not_looked_for_again(evidence: float, place: float, repeated: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
     track_filter, almost = TrackFilter(RATE, CONFIG), found(people((place, 0.0)), evidence=evidence)

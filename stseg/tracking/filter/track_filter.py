@@ -40,10 +40,10 @@ _SURE_VIEWS = 3
 _NUMBERS_OF_BRANCH = 10_000
 """Numbers that are left for tracks that begin beside a branch, which lasts for seconds."""
 EXCLUSION_RADIUS = 0.5
-"""Radius around existing tracks within which no place is interpolated, metres, and no tentative track begins whose
-evidence repeats itself."""
+"""Radius around other tracks within which no place is interpolated, and no tentative track begins whose evidence the
+next frame repeats, metres."""
 _SURE_RADIUS = 0.35
-"""The same of tentative tracks with evidence that adds up in full, metres: in a crowd people nearly touch."""
+"""Radius within which no tentative track begins whose evidence adds up in full, metres: crowds nearly touch."""
 
 
 class Measurement(NamedTuple):
@@ -261,8 +261,8 @@ class TrackFilter:
         None begins near the places of other tracks, `standing` float64 (n, 2), metres.
         """
         by_few = (ghosts.view_evidence != 0).sum(0) < _SURE_VIEWS
-        repeats = np.where(by_few, _REPEATED_EVIDENCE, repeated)
-        odds, radius = ghosts.evidence - repeats, np.where(repeats > 0, EXCLUSION_RADIUS, _SURE_RADIUS)
+        discount = np.where(by_few, _REPEATED_EVIDENCE, repeated)
+        odds, radius = ghosts.evidence - discount, np.where(discount > 0, EXCLUSION_RADIUS, _SURE_RADIUS)
         excluded = distances(ghosts.ground, standing).min(1, initial=np.inf) < radius
         return [
             self._birth(frame, ghosts, j)._replace(odds=float(odds[j]))
