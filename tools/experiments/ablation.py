@@ -53,7 +53,7 @@ WHOLE: dict[str, tuple[str, Any]] = {
 }
 """Mechanisms of whole runs: what is patched, and with what."""
 FINAL: dict[str, tuple[str, Any]] = {
-    "certain rows": (f"{_OBSERVED}._certain", lambda rows, _: np.zeros(len(rows), bool)),
+    "certain rows": (f"{_OBSERVED}._certain", lambda rows, *_: np.zeros(len(rows), bool)),
     "short tracks dropped": (f"{_FINAL}.drop_short", lambda rows, *_: (np.unique(rows["id"]), _NO_EVENTS)),
     "short gaps filled": (f"{_FINAL}.interpolated_rows", lambda rows, *_: rows[:0]),
     "encounters": ("stseg.tracking.row_groups._meetings", lambda rows, _: (rows["id"][:0], rows["frame"][:0])),
