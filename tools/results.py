@@ -22,7 +22,7 @@ from workbench import ROOT, Bench, command_line, commit
 from stseg.io.runfile.runs import read_run
 
 STORE, PAGE = ROOT / "docs" / "results" / "results.csv", ROOT / "docs" / "development" / "results.md"
-ABLATION = STORE.with_name("ablation.csv")
+ABLATION, _NO = STORE.with_name("ablation.csv"), "+0.00 ± 0.00"
 SCORES = {
     "MODA": "MODA",
     "MODP": "MODP",
@@ -96,7 +96,8 @@ def ablation(text: str) -> str:
     with ABLATION.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     sets = list(dict.fromkeys(row["set"] for row in rows))
-    cells = {(row["mechanism"], row["set"]): f"{row['moda']}; {row['idf1']}" for row in rows}
+    changes = {(row["mechanism"], row["set"]): f"{row['moda']}; {row['idf1']}" for row in rows}
+    cells = {key: "0" if change == f"{_NO}; {_NO}" else change for key, change in changes.items()}
     lines = [f"| without | {' | '.join(f'`{name}`' for name in sets)} |", f"| ---{' | --:' * len(sets)} |"]
     lines += [
         f"| {mechanism} | {' | '.join(cells.get((mechanism, name), '-') for name in sets)} |"
@@ -108,8 +109,7 @@ def ablation(text: str) -> str:
 def _filled(text: str, name: str, lines: Sequence[str]) -> str:
     """The text with the lines between the marks of a name."""
     begin, end = f"<!-- {name} -->\n", f"\n<!-- end of {name} -->"
-    before, _, rest = text.partition(begin)
-    return before + begin + "\n".join(lines) + end + rest.partition(end)[2]
+    return text.partition(begin)[0] + begin + "\n".join(lines) + end + text.partition(end)[2]
 
 
 def _scores(row: Row | None) -> str:
