@@ -22,7 +22,8 @@ from workbench import ROOT, Bench, command_line, commit
 from stseg.io.runfile.runs import read_run
 
 STORE, PAGE = ROOT / "docs" / "results" / "results.csv", ROOT / "docs" / "development" / "results.md"
-ABLATION, _NO = STORE.with_name("ablation.csv"), "+0.00 ± 0.00"
+ABLATION = STORE.with_name("ablation.csv")
+_UNCHANGED = "+0.00 ± 0.00; +0.00 ± 0.00"
 SCORES = {
     "MODA": "MODA",
     "MODP": "MODP",
@@ -96,11 +97,10 @@ def ablation(text: str) -> str:
     with ABLATION.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     sets = list(dict.fromkeys(row["set"] for row in rows))
-    changes = {(row["mechanism"], row["set"]): f"{row['moda']}; {row['idf1']}" for row in rows}
-    cells = {key: "0" if change == f"{_NO}; {_NO}" else change for key, change in changes.items()}
+    cells = {(row["mechanism"], row["set"]): f"{row['moda']}; {row['idf1']}" for row in rows}
     lines = [f"| without | {' | '.join(f'`{name}`' for name in sets)} |", f"| ---{' | --:' * len(sets)} |"]
     lines += [
-        f"| {mechanism} | {' | '.join(cells.get((mechanism, name), '-') for name in sets)} |"
+        f"| {mechanism} | {' | '.join(cells.get((mechanism, name), '-') for name in sets)} |".replace(_UNCHANGED, "0")
         for mechanism in dict.fromkeys(row["mechanism"] for row in rows)
     ]
     return _filled(text, "ablation", lines)
