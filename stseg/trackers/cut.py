@@ -38,7 +38,7 @@ from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import TrackPlaces, event_rows, fill_views, trajectory_rows
 from stseg.trackers.window_existence import TrackedFrame, WindowExistence, people_at
 from stseg.tracking.filter.prediction import earlier_detections, predicted_places, together
-from stseg.tracking.filter.track_filter import TrackFilter, repeated_evidence
+from stseg.tracking.filter.track_filter import TrackFilter
 from stseg.tracking.windows.tracklets import form_tracklets
 from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
 from stseg.tracking.windows.windows import ENDLESS, LONGEST, Window, windows
@@ -107,7 +107,7 @@ class CutTracker:
             self.window = next(self.coming)
             needed = self.window.solve_first - self.context
             self.open_frames = [tracked for tracked in self.open_frames if tracked.fused.frame >= needed]
-        tracks = self.filter.update(fused.frame, fused.people, fused.ghosts, repeated_evidence(observed.evidence))
+        tracks = self.filter.update(fused.frame, fused.people, fused.ghosts, observed.evidence)
         self.open_frames.append(TrackedFrame(fused, tracks))
         return self._solved(1)
 

@@ -13,7 +13,7 @@ from stseg.records.sparse_labels import SparseLabels
 from stseg.records.tables import WINDOW
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces, event_rows, fill_views, trajectory_rows
-from stseg.tracking.filter.track_filter import TrackFilter, repeated_evidence
+from stseg.tracking.filter.track_filter import TrackFilter
 
 
 class FramewiseTracker:
@@ -51,7 +51,7 @@ class FrameTracker(FramewiseTracker):
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
         """Add a frame; it is committed at once."""
         people, issued = fused.people, self.filter.issued
-        ids = self.filter.update(fused.frame, people, fused.ghosts, repeated_evidence(observed.evidence))
+        ids = self.filter.update(fused.frame, people, fused.ghosts, observed.evidence)
         births = [(fused.frame, "birth", int(i), 0, "nobody known was near") for i in np.sort(ids[ids > issued])]
         sizes = people.sizes.measured(self.config.body)
         tracks = TrackPlaces(ids, people.ground, people.covariance, *sizes, people.evidence)

@@ -21,7 +21,7 @@ from stseg.geometry.distances import distances
 from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import TRAJECTORY
 from stseg.tracking.filter.motion_model import augmented_noise, augmented_transition
-from stseg.tracking.filter.track_filter import EXCLUSION_RADIUS
+from stseg.tracking.filter.tentative_tracks import EXCLUSION_RADIUS
 from stseg.tracking.row_groups import rows_of_tracks
 
 _ROWS_AT_ONCE = 8192

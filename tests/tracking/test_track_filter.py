@@ -18,14 +18,8 @@ from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.people import People
 from stseg.records.sizes import Sizes
 from stseg.tracking.filter.motion_model import process_noise, transition
-from stseg.tracking.filter.track_filter import (
-    BodyPlace,
-    Measurement,
-    PlacePosterior,
-    TrackFilter,
-    TrackState,
-    repeated_evidence,
-)
+from stseg.tracking.filter.track_filter import TrackFilter
+from stseg.tracking.filter.track_state import BodyPlace, Measurement, PlacePosterior, TrackState
 from stseg.trajectories.smoother import smoothed_paths
 
 RATE = 8.0
@@ -35,7 +29,8 @@ GHOSTS = found(people())
 NOTHING = Measurement(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
 """Place of a person in a frame: x, y, height in metres; None where the frame does not see them."""
-TENTATIVE = [(-1, 2, 2, 2), (-5, 2, 2, 1), (-1, 0.4, 2, 1), (-1, 0.4, 0, 2), (-1, 0.3, 0, 1)]
+BOXES, PIXELS = Boxes(np.zeros((0, 4)), np.zeros(0)), np.zeros((1, 1), np.float32)
+TENTATIVE = [(-1, 2, BOXES, 2), (-5, 2, BOXES, 1), (-1, 0.4, BOXES, 1), (-1, 0.4, PIXELS, 2), (-1, 0.3, PIXELS, 1)]
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
 
 
@@ -220,14 +215,13 @@ def test_odds_fall_while_out_of_sight_until_patience_ends() -> None:
 
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
-    boxes, pixels = Boxes(np.zeros((0, 4)), np.zeros(0)), np.zeros((1, 1), np.float32)
     cases: list[tuple[bool, ViewEvidence, int, float]] = [
-        *((again, boxes, 4, -3.0) for again in (True, False)),
-        *((True, pixels, views, odds) for views, odds in ((2, -3.0), (3, -1.0))),
+        *((again, BOXES, 4, -3.0) for again in (True, False)),
+        *((True, PIXELS, views, odds) for views, odds in ((2, -3.0), (3, -1.0))),
     ]
     for found_again, view, views, odds in cases:
         track_filter, almost = TrackFilter(RATE, CONFIG), found(people((0.5, 0.5)), evidence=-1.0, views=views)
-        assert track_filter.update(0, GHOSTS, almost, repeated_evidence([None, view])).shape == (0,)
+        assert track_filter.update(0, GHOSTS, almost, [None, view]).shape == (0,)
         expected = track_filter.predict(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
@@ -238,11 +232,11 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
         assert track_filter.issued == len(track_filter.tracks) == int(found_again)
 
 
-@pytest.mark.parametrize(("evidence", "place", "repeated", "looked_for"), TENTATIVE)
-def test_who_is_not_looked_for_again(evidence: float, place: float, repeated: float, looked_for: int) -> None:
+@pytest.mark.parametrize(("evidence", "place", "view", "looked_for"), TENTATIVE)
+def test_who_is_not_looked_for_again(evidence: float, place: float, view: ViewEvidence, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
     track_filter, almost = TrackFilter(RATE, CONFIG), found(people((place, 0.0)), evidence=evidence)
-    track_filter.update(0, found(people((0, 0))), almost, repeated)
+    track_filter.update(0, found(people((0, 0))), almost, [view])
     assert len(track_filter.predict(1) or ()) == looked_for
     assert [track.track for track in track_filter.tracks] == [1, 0][:looked_for]
 
