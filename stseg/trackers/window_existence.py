@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count
 
 import numpy as np
 
@@ -18,11 +17,6 @@ from stseg.segmentation.candidate_links import LinkModel, WindowCandidates
 from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.filter.prediction import DetectionHistory
-
-_LEAST_LOG_ODDS = 12.0
-"""Least log-odds of people that the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""
-_FIRST_NUMBER = 1 << 30
-"""First number of their tracks: those of the filter count from 1."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +46,6 @@ class WindowExistence:
         links = LinkModel(rig.frame_rate, patience, prior, config.motion, config.body)
         radius = config.occupancy.person_radius
         self.model = ExistenceModel(links, radius, Border.of(rig), config.detection, config.body)
-        self._numbers = count(_FIRST_NUMBER)
 
     def revised(self, frames: Sequence[TrackedFrame], first: int, stop: int) -> list[TrackedFrame]:
         """Frames first .. stop - 1 with the people that are real by all frames given, those before and after too."""
@@ -60,8 +53,6 @@ class WindowExistence:
         decision = self.model.decide(found, self.solver.sparse)
         inside = self.model.border.inside(found.ground, self.model.detection.border_width) >= 1
         tracks = tracks_of(found, decision, inside)
-        for rows in found_by_window(found, decision):
-            tracks[rows] = next(self._numbers)
         bounds = np.searchsorted(found.frame, np.arange(len(frames) + 1))
         return [
             self._frame(one, tracks[rows], decision.log_odds[rows])
@@ -101,8 +92,8 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
     """Track of each candidate that is real, 0 for the others: added ones take that of the next detection on their path.
 
     A candidate is added between two of the detector's people, and before the first of a path away from the border,
-    where no person appears. Elsewhere candidates are the best of many places that were tried, and so are their sums
-    (`found_by_window` asks for more); and what prolongs a track at the border of the area costs nothing.
+    where no person appears. Elsewhere candidates are the best of many places that were tried, and so are their sums:
+    a path of them alone is nobody. What prolongs a track at the border of the area costs nothing.
     """
     detected = np.where(decision.real, found.track, 0)
     linked = np.flatnonzero((decision.successor >= 0) & decision.real)
@@ -113,21 +104,6 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
     for i in linked[::-1].tolist():
         _take_over(later, i, int(decision.successor[i]), found)
     return np.where((earlier > 0) | inside, later, 0)
-
-
-def found_by_window(found: WindowCandidates, decision: Existence) -> list[Ints]:
-    """Rows of each path of rejected candidates alone that the window is sure of, one int64 (k,) a path.
-
-    The evidence of a small or hardly visible person is less than a birth in each frame, and much more in all of them.
-    """
-    head, rows = np.arange(len(found)), np.flatnonzero(decision.real)
-    for i in rows.tolist():
-        if decision.successor[i] >= 0:
-            head[decision.successor[i]] = head[i]
-    by_path = rows[np.argsort(head[rows], kind="stable")]
-    paths = np.split(by_path, np.flatnonzero(np.diff(head[by_path])) + 1)
-    certain = [rows for rows in paths if decision.log_odds[rows].max(initial=0.0) >= _LEAST_LOG_ODDS]
-    return [rows for rows in certain if not found.track[rows].any()]
 
 
 def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:

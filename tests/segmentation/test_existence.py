@@ -19,7 +19,7 @@ from stseg.segmentation import paths as paths_module
 from stseg.segmentation.candidate_links import LinkModel, WindowCandidates
 from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.segmentation.paths import best_paths, path_marginals
-from stseg.trackers.window_existence import found_by_window, tracks_of
+from stseg.trackers.window_existence import tracks_of
 
 CONFIG = Config()
 RIG = room()
@@ -53,13 +53,11 @@ def test_who_stays_and_who_goes(evidence: list[float], other: list[list[float]],
     assert real[(found.track < 2) & (found.evidence > 0)].all() and (~real).sum() == gone
 
 
-def test_a_certain_path_of_candidates_is_a_person_none_nobody() -> None:
-    for evidence, paths in ((7.0, 1), (2.0, 0)):
-        found = candidates(*walk(np.full(9, evidence), track=0), *walk(np.full(9, 9.0), off=1.0))
-        decision = decide(found)
-        assert decision.real.all()
-        rows = found_by_window(found, decision)
-        assert len(rows) == paths and all((found.ground[own, 1] == 0).all() and len(own) == 9 for own in rows)
+def test_rejected_candidates_alone_are_nobody() -> None:
+    found = candidates(*walk(np.full(9, 7.0), track=0), *walk(np.full(9, 9.0), off=1.0))
+    decision = decide(found)
+    assert decision.real.all()
+    assert (tracks_of(found, decision, np.ones(18, bool)) == found.track).all()
     none, numbers = np.zeros(0), np.zeros(0, np.int64)
     empty = WindowCandidates(numbers, np.zeros((0, 2)), np.zeros((0, 2, 2)), none, none, numbers)
     assert len(decide(empty).real) == 0

@@ -44,7 +44,6 @@ WHOLE: dict[str, tuple[str, Any]] = {
     "blob scale": ("stseg.detection.frame_evidence.blob_scales", lambda rasters, *_: np.zeros_like(rasters)),
     "hard core": (f"{_DETECTOR}.CORE_MARGIN", 0.3),
     "window existence": ("stseg.trackers.window_existence.WindowExistence.revised", _unrevised),
-    "people of windows alone": ("stseg.trackers.window_existence.found_by_window", lambda *_: []),
     "noise of boxes": ("stseg.noise.box_noise_estimate.BoxNoiseEstimate.learn", lambda *_: None),
     "bias of boxes": ("stseg.noise.box_bias_estimate.BoxBiasEstimate.learn", lambda *_: None),
     "population": ("stseg.noise.population_estimate.PopulationEstimate.learn", lambda *_: None),
