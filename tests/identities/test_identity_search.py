@@ -29,7 +29,12 @@ from stseg.io.runfile.runs import Run, read_run
 from stseg.tracking.row_groups import isolated_tracklets
 
 MODEL = SizeModel(
-    np.array([1.7]), np.array([0.03**2]), np.array([0.03**2 * 0.5 * RATE]), np.array([0.1**2]), np.full(1, np.inf)
+    np.array([1.7]),
+    np.array([0.03**2]),
+    np.array([0.03**2 * 0.5 * RATE]),
+    np.array([0.1**2]),
+    np.array([0.005**2]),
+    np.full(1, np.inf),
 )
 LONGEST = 1.0
 
@@ -49,8 +54,8 @@ def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
         patch.setattr(search, "_BEAM_LOSS", 1e5)
         seen = seen_of(rows[:6])
         names = found(seen, hypotheses=5000).tolist()
-    best = greatest_score(seen, MODEL.spread, CONFIG.motion, LONGEST) if len(rows) else 0.0
-    assert score(seen, names, MODEL.spread, CONFIG.motion, LONGEST) == pytest.approx(best, abs=1e-6)
+    best = greatest_score(seen, MODEL, CONFIG.motion, LONGEST) if len(rows) else 0.0
+    assert score(seen, names, MODEL, CONFIG.motion, LONGEST) == pytest.approx(best, abs=1e-6)
 
 
 def test_early_names_are_of_one_hypothesis_and_later_ones_count() -> None:

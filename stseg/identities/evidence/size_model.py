@@ -1,7 +1,8 @@
-"""Errors and spread of people's sizes, learned from isolated tracklets (docs/how-it-works.md, Tracks).
+"""Errors and spread of people's sizes, learned from rows of each person (docs/how-it-works.md, Tracks).
 
 A measured size is x = mean + person + error. A part of the error lasts (`stseg.noise.lasting_error`); the person's
-part has the variance `spread` among people. A size of spread 0 says nothing of identity.
+part has the variance `spread` among people, and drifts: the sums of a long track never become surer than a height is.
+A size of spread 0 says nothing of identity.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ _PRIOR_PEOPLE = 4.0
 """Weight of the prior of the spread: pairs of tracklets."""
 _PRIOR_TIME = 0.5
 """Prior time constant of an error, seconds."""
+_DRIFT = 0.005
+"""Change of a person's apparent height in a second, metres (standard deviation): bearing, the views that see it."""
 _FARTHEST = 4.0
 """Deviation of a row's size from which it is no size of the person, standard deviations: those who sit or bend."""
 
@@ -70,13 +73,15 @@ class SizeModel:
     """Variance of the error of one row, and that with which each of many rows counts as independent of the others."""
     spread: Floats
     """Variance among people; 0 where the size says nothing."""
+    drift: Floats
+    """Variance that a person's apparent size gains in a second; 0 for none."""
     most_against: Floats
     """Greatest evidence of one independent look for a new person instead of a known one, nats: it may be an outlier."""
 
     @classmethod
     def joined(cls, parts: Sequence[SizeModel]) -> SizeModel:
         """The sizes of all parts, one after the other."""
-        names = ("mean", "variance", "row_variance", "spread", "most_against")
+        names = ("mean", "variance", "row_variance", "spread", "drift", "most_against")
         return cls(*(np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)]) for name in names))
 
     def evidence(self, sizes: Sequence[Floats], rows: Ints | slice = slice(None)) -> tuple[Floats, Floats]:
@@ -104,14 +109,15 @@ def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], fr
     frame : int64 (n,)
         Frame of each row.
     tracklets
-        Rows of each isolated tracklet, in the order of time.
+        Rows of each isolated tracklet, or of each person, in the order of time.
     frame_rate
         Frames per second.
     """
     columns = zip(sizes.value.T, sizes.priors, strict=True)
     learned = [_learn(column, frame, tracklets, prior, frame_rate) for column, prior in columns]
     mean, variance, row_variance, spread = np.array(learned, np.float64).reshape(-1, 4).T
-    return SizeModel(mean, variance, row_variance, spread, np.full(len(learned), np.inf))
+    drift = np.full(len(learned), _DRIFT**2)
+    return SizeModel(mean, variance, row_variance, spread, drift, np.full(len(learned), np.inf))
 
 
 def evidence(precision: Floats, information: Floats, spread: Floats) -> Floats:
