@@ -76,7 +76,8 @@ class IdentityProblem:
 
         # Tracklets are right, but errors outlast them; identities last, and few of them are wrong.
         draft = problem(tracklets).with_hypotheses(-(-tracking.hypotheses // _DRAFT_DIVISOR))
-        return problem(_people(draft.solve(constraints), frame))
+        by_time = np.argsort(frame, kind="stable")
+        return problem([by_time[rows] for rows in rows_of_tracks(draft.solve(constraints)[by_time])])
 
     def with_hypotheses(self, number: int) -> IdentityProblem:
         """The problem with another number of hypotheses."""
@@ -118,12 +119,6 @@ class IdentityProblem:
         place[part.order] = np.arange(len(part.order))
         bound = constraints.renumbered(place).among()
         return search_identities(part, self.model, self.motion, self.limits, bound).score
-
-
-def _people(identity: Ints, frame: Ints) -> list[Ints]:
-    """Rows of each identity (n,), in the order of time."""
-    order = np.lexsort((frame, identity))
-    return np.split(order, np.flatnonzero(np.diff(identity[order])) + 1) if len(order) else []
 
 
 def _person_of(people: Sequence[Ints]) -> Ints:

@@ -56,14 +56,20 @@ def test_tracks_that_were_right_stay(people: dict[int, tuple[Path, float, range]
     assert not found.links
 
 
+def test_a_drift_of_height_or_a_jump_at_the_border_is_no_birth() -> None:
+    rows = rows_of({1: (straight(0, 0, 0, 0), 1.7, range(400)), 2: (straight(0.6, 0, 0, 0), 1.8, range(400))})
+    rows["height"][rows["id"] == 1] -= 0.06 * np.arange(400) / 400
+    assert len(np.unique(relinked(rows).identity)) == 2
+    rows = rows_of({1: (straight(-2, 5.9, 0.5, 0), 1.7, range(60))})
+    rows["x"] += 0.45 * (rows["frame"] > 30)
+    assert len(np.unique(relinked(rows[rows["frame"] != 30]).identity)) == 1
+
+
 def test_somebody_lost_inside_the_area_is_the_same_afterwards() -> None:
-    rows = gone(2.0)
-    found = relinked(rows)
-    assert set(found.identity.tolist()) == {1}
+    found = relinked(gone(2.0))
     (link,) = found.links
-    assert (link.frame, link.identity, link.track) == (40, 1, 2)
-    assert link.reason.startswith("2.1 s on") and link.reason.isascii()
-    assert len(link.reason) <= EVENT["reason"].itemsize
+    assert (set(found.identity.tolist()), link.frame, link.identity, link.track) == ({1}, 40, 1, 2)
+    assert link.reason.startswith("2.1 s on") and link.reason.isascii() and len(link.reason) <= EVENT["reason"].itemsize
     rows = gone(CONFIG.tracking.maximum_gap + 0.25)
     np.testing.assert_array_equal(relinked(rows).identity, rows["id"], "too long is somebody else")
 
@@ -91,9 +97,7 @@ def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
 def test_tracks_are_cut_at_gaps_and_nothing_teaches_nothing() -> None:
     rows = rows_of(PASSING, noise=0.0)
     rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
-    parts = [
-        (int(rows["id"][part[0]]), *rows["frame"][part[[0, -1]]].tolist()) for part in isolated_tracklets(rows, RATE)
-    ]
+    parts = [(int(rows["id"][p[0]]), *rows["frame"][p[[0, -1]]].tolist()) for p in isolated_tracklets(rows, RATE)]
     assert parts == [(1, 0, 31), (1, 32, 49), (1, 53, 63), (2, 0, 31), (2, 32, 63)]
     assert learned(walkers()[:0], np.zeros(0, APPEARANCE)).value.shape == (0, 0)
     one = walkers()

@@ -21,10 +21,8 @@ from stseg.identities.search.constraints import NO_CONSTRAINTS, ConstrainedPeopl
 from stseg.identities.search.hypotheses import Hypotheses, Pasts, Rules
 
 _BIRTH, _BORDER_BIRTH = 6.0, 2.0
-"""Cost of a birth or a death inside the area, and of a birth at its border, nats (per square metre).
-
-Were births at the border free, a person who turns there would be cut in two.
-"""
+"""Cost of a birth or a death inside the area, and of a birth at its border, nats (per square metre): were that free, a
+person who turns there would be cut in two."""
 _ABSENCE = 1.0
 """Cost of being unseen, nats per second."""
 _ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0

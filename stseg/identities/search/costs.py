@@ -82,9 +82,7 @@ def _add_size_costs(
         precision, information = kept * pasts.precision[p, d], kept * pasts.information[p, d]
         before = size_evidence(precision, information, rules.spread[d])
         for i in range(len(alone)):
-            added = observed.precision[first + i, d]
+            r, added = first + i, observed.precision[first + i, d]
             if added != 0.0 and costs.cost[p, i] < FORBIDDEN:
-                both = size_evidence(
-                    precision + added, information + observed.information[first + i, d], rules.spread[d]
-                )
+                both = size_evidence(precision + added, information + observed.information[r, d], rules.spread[d])
                 costs.cost[p, i] -= max(both - before, alone[i, d] - rules.most_against[d] * added)
