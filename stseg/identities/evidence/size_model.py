@@ -99,7 +99,7 @@ class SizeModel:
         return precision, information
 
 
-def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], frame_rate: float) -> SizeModel:
+def learn_sizes(sizes: MeasuredSizes, frame: Ints, people: Sequence[Ints], frame_rate: float) -> SizeModel:
     """Statistics of the sizes of a recording.
 
     Parameters
@@ -108,13 +108,13 @@ def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], fr
         Of each row.
     frame : int64 (n,)
         Frame of each row.
-    tracklets
-        Rows of each isolated tracklet, or of each person, in the order of time.
+    people
+        Rows of each person as far as it is known, an isolated tracklet or an identity, in the order of time.
     frame_rate
         Frames per second.
     """
     columns = zip(sizes.value.T, sizes.priors, strict=True)
-    learned = [_learn(column, frame, tracklets, prior, frame_rate) for column, prior in columns]
+    learned = [_learn(column, frame, people, prior, frame_rate) for column, prior in columns]
     mean, variance, row_variance, spread = np.array(learned, np.float64).reshape(-1, 4).T
     drift = np.full(len(learned), _DRIFT**2)
     return SizeModel(mean, variance, row_variance, spread, drift, np.full(len(learned), np.inf))
