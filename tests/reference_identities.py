@@ -4,12 +4,10 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import norm
 
 from stseg.arrays import Floats
 from stseg.config import MotionConfig
 from stseg.identities.evidence.observations import Observations
-from stseg.identities.evidence.size_model import SizeModel
 from stseg.tracking.filter.motion_model import process_noise, transition
 
 BIRTH, BORDER_BIRTH, ABSENCE, LEAST = 6.0, 2.0, 1.0, -25.0
@@ -25,12 +23,12 @@ def partitions(rows: int) -> Iterator[list[int]]:
             yield [*names, name]
 
 
-def greatest_score(seen: Observations, model: SizeModel, motion: MotionConfig, longest: float) -> float:
+def greatest_score(seen: Observations, spread: Floats, motion: MotionConfig, longest: float) -> float:
     """Score of the best partition."""
-    return max(score(seen, names, model, motion, longest) for names in partitions(len(seen.order)))
+    return max(score(seen, names, spread, motion, longest) for names in partitions(len(seen.order)))
 
 
-def score(seen: Observations, names: list[int], model: SizeModel, motion: MotionConfig, longest: float) -> float:
+def score(seen: Observations, names: list[int], spread: Floats, motion: MotionConfig, longest: float) -> float:
     """Score of a partition of the rows, nats; minus infinity where it is not allowed."""
     seconds = np.repeat(seen.seconds, np.diff(seen.start))
     total = 0.0
@@ -39,7 +37,7 @@ def score(seen: Observations, names: list[int], model: SizeModel, motion: Motion
         if len(set(seconds[own])) < len(own) or (np.diff(seconds[own]) > longest).any():
             return -np.inf
         born = BORDER_BIRTH + (BIRTH - BORDER_BIRTH) * seen.rows.inside[name]
-        total += path(seen, own, seconds, motion) - born + sizes(seen, own, seconds, model)
+        total += path(seen, own, seconds, motion) - born + sizes(seen, own, spread)
         if seconds[-1] - seconds[own[-1]] > longest:
             total -= BIRTH * seen.rows.inside[own[-1]]
     broken = [row for row in np.flatnonzero(seen.rows.certain) if names[row] != names[seen.rows.previous[row]]]
@@ -64,17 +62,14 @@ def path(seen: Observations, own: list[int], seconds: Floats, motion: MotionConf
     return total
 
 
-def sizes(seen: Observations, own: list[int], seconds: Floats, model: SizeModel) -> float:
-    """Log-likelihood ratio of each size against the population's mean, by the person's sizes in the rows before."""
+def sizes(seen: Observations, own: list[int], spread: Floats) -> float:
+    """Log-likelihood ratio of one size in all rows, against the mean of the population in each."""
     total = 0.0
-    for d, (variance, drift) in enumerate(zip(model.spread, model.drift, strict=True)):
-        precision = information = before = 0.0
-        for row in own:
-            kept = 1 / (1 + precision * drift * (seconds[row] - before))
-            precision, information, before = kept * precision, kept * information, seconds[row]
-            if (added := seen.rows.precision[row, d]) > 0:
-                known = variance / (1 + variance * precision)
-                off, noise = seen.rows.information[row, d] / added, 1 / added
-                total += norm.logpdf(off, known * information, np.sqrt(known + noise)) - norm.logpdf(off, 0, noise**0.5)
-                precision, information = precision + added, information + added * off
-    return float(total)
+    for d, variance in enumerate(spread):
+        known = [row for row in own if seen.rows.precision[row, d] > 0]
+        noise = np.diag([1 / seen.rows.precision[row, d] for row in known])
+        off = np.array([seen.rows.information[row, d] / seen.rows.precision[row, d] for row in known])
+        for around, sign in ((noise + variance, -0.5), (noise, 0.5)):
+            if known:
+                total += sign * float(off @ np.linalg.solve(around, off) + np.linalg.slogdet(around)[1])
+    return total

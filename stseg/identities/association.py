@@ -114,7 +114,7 @@ class IdentityProblem:
         are `left_out`, int64 (m,), counts for those that stand in for them, int64 (m,).
         """
         number = self.observations.number
-        part = self.observations.at(np.sort(number[chosen]), number[left_out], number[stand_in], self.model.drift)
+        part = self.observations.at(np.sort(number[chosen]), number[left_out], number[stand_in])
         place = np.full(len(number), -1)
         place[part.order] = np.arange(len(part.order))
         bound = constraints.renumbered(place).among()

@@ -185,5 +185,5 @@ def _learned(
     row_variance = np.maximum(lasting, errors.row_variance(frame_rate))
     # An observation may be of a person in front: under a share of such errors none says more than this against one.
     most_against = np.full(number, -np.log(WRONG) / max(number, 1))
-    model = SizeModel(np.zeros(number), np.ones(number), row_variance, axes.spread, np.zeros(number), most_against)
+    model = SizeModel(np.zeros(number), np.ones(number), row_variance, axes.spread, most_against)
     return LearnedAppearance(along, model, axes)

@@ -64,27 +64,18 @@ class Observations:
         """int64 (n,): index of the frame of each observation."""
         return np.repeat(np.arange(len(self.seconds)), np.diff(self.start))
 
-    def at(self, chosen: Ints, left_out: Ints, stand_in: Ints, drift: Floats) -> Observations:
+    def at(self, chosen: Ints, left_out: Ints, stand_in: Ints) -> Observations:
         """Some of them alone, int64 (k,), rising; people of whom none was observed before are new there.
 
         The size evidence of those that are left out, int64 (m,), counts for chosen ones that stand in for each, (m,).
-        Sizes drift meanwhile, by float64 (size,) a second (`SizeModel`): their mean over a time has a third of the
-        variance that they gain in it.
         """
         frames, start = np.unique(self._frame[chosen], return_index=True)
         place = np.full(len(self.order) + 1, -1)  # the last is that of no observation
         place[chosen] = np.arange(len(chosen))
         one, previous = self.rows, place[self.rows.previous[chosen]]
         precision, information = one.precision[chosen], one.information[chosen]
-        standing, index = np.unique(place[stand_in], return_inverse=True)
-        pooled, reach = np.zeros((2, len(standing), len(drift))), np.zeros((len(standing), 1))
-        for sums, value in zip(pooled, (one.precision, one.information), strict=True):
-            np.add.at(sums, index, value[left_out])
-        away = np.abs(self.seconds[self._frame[left_out]] - self.seconds[self._frame[stand_in]])
-        np.maximum.at(reach[:, 0], index, away)
-        pooled /= 1.0 + pooled[0] * drift * reach / 3.0
-        precision[standing] += pooled[0]
-        information[standing] += pooled[1]
+        np.add.at(precision, place[stand_in], one.precision[left_out])
+        np.add.at(information, place[stand_in], one.information[left_out])
         certain, inside, sign = one.certain[chosen] & (previous >= 0), one.inside[chosen], _signs(len(chosen))
         places = one.ground[chosen], one.variance[chosen], previous, certain, inside
         rows = ObservedRows(*places, precision, information, sign)

@@ -1,8 +1,7 @@
 """Errors and spread of people's sizes, learned from rows of each person (docs/how-it-works.md, Tracks).
 
 A measured size is x = mean + person + error. A part of the error lasts (`stseg.noise.lasting_error`); the person's
-part has the variance `spread` among people, and drifts: the sums of a long track never become surer than a height is.
-A size of spread 0 says nothing of identity.
+part has the variance `spread` among people. A size of spread 0 says nothing of identity.
 """
 
 from __future__ import annotations
@@ -22,8 +21,9 @@ _PRIOR_PEOPLE = 4.0
 """Weight of the prior of the spread: pairs of tracklets."""
 _PRIOR_TIME = 0.5
 """Prior time constant of an error, seconds."""
-_DRIFT = 0.005
-"""Change of a person's apparent height in a second, metres (standard deviation): bearing, the views that see it."""
+_BEARING = LastingError(np.array(0.0), np.array(0.007**2), np.array(5.0))
+"""Error of a height beside what is learned, square metres: how people walk and stoop lasts longer than tracklets.
+Without it, the many frames of a person who stoops are surely of two people."""
 _FARTHEST = 4.0
 """Deviation of a row's size from which it is no size of the person, standard deviations: those who sit or bend."""
 
@@ -73,15 +73,13 @@ class SizeModel:
     """Variance of the error of one row, and that with which each of many rows counts as independent of the others."""
     spread: Floats
     """Variance among people; 0 where the size says nothing."""
-    drift: Floats
-    """Variance that a person's apparent size gains in a second; 0 for none."""
     most_against: Floats
     """Greatest evidence of one independent look for a new person instead of a known one, nats: it may be an outlier."""
 
     @classmethod
     def joined(cls, parts: Sequence[SizeModel]) -> SizeModel:
         """The sizes of all parts, one after the other."""
-        names = ("mean", "variance", "row_variance", "spread", "drift", "most_against")
+        names = ("mean", "variance", "row_variance", "spread", "most_against")
         return cls(*(np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)]) for name in names))
 
     def evidence(self, sizes: Sequence[Floats], rows: Ints | slice = slice(None)) -> tuple[Floats, Floats]:
@@ -116,8 +114,7 @@ def learn_sizes(sizes: MeasuredSizes, frame: Ints, people: Sequence[Ints], frame
     columns = zip(sizes.value.T, sizes.priors, strict=True)
     learned = [_learn(column, frame, people, prior, frame_rate) for column, prior in columns]
     mean, variance, row_variance, spread = np.array(learned, np.float64).reshape(-1, 4).T
-    drift = np.full(len(learned), _DRIFT**2)
-    return SizeModel(mean, variance, row_variance, spread, drift, np.full(len(learned), np.inf))
+    return SizeModel(mean, variance, row_variance, spread, np.full(len(learned), np.inf))
 
 
 def evidence(precision: Floats, information: Floats, spread: Floats) -> Floats:
@@ -138,7 +135,7 @@ def _learn(
     measured = measured_tracklets(size, tracklets)
     mean = float(np.mean(size[np.concatenate(measured)])) if measured else 0.0
     errors = constant_errors(size[None], frame, measured, prior.errors(), frame_rate)
-    row_variance = float(errors.row_variance(frame_rate)[0])
+    row_variance = float(errors.row_variance(frame_rate)[0] + _BEARING.row_variance(frame_rate))
     return mean, float(errors.variance[0]), row_variance, _spread(size - mean, measured, prior)
 
 

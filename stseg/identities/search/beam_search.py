@@ -169,6 +169,5 @@ def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rule
         motion.velocity_noise**2,
         motion.speed_spread**2,
         sizes.spread,
-        sizes.drift,
         sizes.most_against * sizes.variance,
     )

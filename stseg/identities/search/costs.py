@@ -7,7 +7,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.identities.evidence.observations import ObservedRows
-from stseg.identities.search.hypotheses import Pasts, Rules, predicted_variance, share_kept, size_evidence
+from stseg.identities.search.hypotheses import Pasts, Rules, predicted_variance, size_evidence
 from stseg.kernels.accelerate import kernel, part
 
 FORBIDDEN = 1e6
@@ -46,43 +46,32 @@ def row_costs(
             evidence += alone[i, d]
         costs.begun[i] = rules.border_birth + (rules.birth - rules.border_birth) * observed.inside[r] - evidence
     for p in range(size):
-        _fill_costs(pasts, p, first, now, observed, rules, costs)
-        _add_size_costs(pasts, p, first, now, observed, rules, alone, costs)
+        _fill_costs(pasts, p, first, now, observed, rules, alone, costs)
     return costs
 
 
 @part
 def _fill_costs(
-    pasts: Pasts, p: int, first: int, now: float, observed: ObservedRows, rules: Rules, costs: RowCosts
+    pasts: Pasts, p: int, first: int, now: float, observed: ObservedRows, rules: Rules, alone: Floats, costs: RowCosts
 ) -> None:
-    """Fill the costs of rows as those of the p-th past, by places alone."""
+    """Fill the costs of rows as those of the p-th past; `alone` (row, size) is the size evidence of new people."""
     since = now - pasts.seconds[p]
     x = pasts.state[p, 0] + since * pasts.state[p, 2]
     y = pasts.state[p, 1] + since * pasts.state[p, 3]
     spreads = predicted_variance(pasts.covariance, p, since, rules.turn)
-    for i in range(costs.cost.shape[1]):
+    for i in range(len(alone)):
         r = first + i
         if observed.certain[r] and observed.previous[r] != pasts.last[p]:
             continue
         total = spreads + observed.variance[r]
         square = (observed.ground[r, 0] - x) ** 2 + (observed.ground[r, 1] - y) ** 2
         gain = -0.5 * square / total - math.log(2.0 * math.pi * total) - rules.absence * since
+        for d in range(alone.shape[1]):
+            if observed.precision[r, d] == 0.0:
+                continue
+            both = pasts.precision[p, d] + observed.precision[r, d]
+            together = size_evidence(both, pasts.information[p, d] + observed.information[r, d], rules.spread[d])
+            gain += max(together - pasts.evidence[p, d], alone[i, d] - rules.most_against[d] * observed.precision[r, d])
         costs.cost[p, i] = -gain
         if observed.certain[r]:
             costs.follower[p] = i
-
-
-@part
-def _add_size_costs(
-    pasts: Pasts, p: int, first: int, now: float, observed: ObservedRows, rules: Rules, alone: Floats, costs: RowCosts
-) -> None:
-    """Add what sizes cost rows as those of the p-th past; `alone` (row, size) is the evidence of new people, nats."""
-    for d in range(alone.shape[1]):
-        kept = share_kept(pasts.precision[p, d], now - pasts.seconds[p], rules.drift[d])
-        precision, information = kept * pasts.precision[p, d], kept * pasts.information[p, d]
-        before = size_evidence(precision, information, rules.spread[d])
-        for i in range(len(alone)):
-            r, added = first + i, observed.precision[first + i, d]
-            if added != 0.0 and costs.cost[p, i] < FORBIDDEN:
-                both = size_evidence(precision + added, information + observed.information[r, d], rules.spread[d])
-                costs.cost[p, i] -= max(both - before, alone[i, d] - rules.most_against[d] * added)

@@ -133,9 +133,11 @@ class Pasts(NamedTuple):
     covariance: Floats
     """float64 (past, 3): of either axis: place, place and velocity, velocity."""
     precision: Floats
-    """float64 (past, size): inverse variance of what the identity's observations say of its sizes."""
+    """float64 (past, size): sums over the identity's observations."""
     information: Floats
-    """float64 (past, size): the precision times the deviation of the size from the population's mean."""
+    """float64 (past, size): sums over the identity's observations."""
+    evidence: Floats
+    """float64 (past, size): of these sums for one person, nats; see `size_evidence`."""
 
     @classmethod
     def empty(cls, number: int, sizes: int) -> Pasts:
@@ -146,7 +148,7 @@ class Pasts(NamedTuple):
             np.empty(number),
             np.empty((number, 4)),
             np.empty((number, 3)),
-            *(np.empty((number, sizes)) for _ in range(2)),
+            *(np.empty((number, sizes)) for _ in range(3)),
         )
 
 
@@ -155,12 +157,6 @@ def size_evidence(precision: float, information: float, spread: float) -> float:
     """Log-likelihood ratio of observations of one person against the population's mean, nats (Gaussian, pooled)."""
     total = 1.0 + precision * spread
     return 0.5 * (spread * information * information / total - math.log(total))
-
-
-@part
-def share_kept(precision: float, seconds: float, drift: float) -> float:
-    """Share of what was known of a size that still counts some seconds later: its variance grows by the drift."""
-    return 1.0 / (1.0 + precision * drift * seconds)
 
 
 @part
@@ -180,6 +176,7 @@ def begin_past(pasts: Pasts, p: int, r: int, now: float, observed: ObservedRows,
     pasts.covariance[p, 0], pasts.covariance[p, 1], pasts.covariance[p, 2] = observed.variance[r], 0.0, rules.pace
     for d in range(pasts.precision.shape[1]):
         pasts.precision[p, d], pasts.information[p, d] = observed.precision[r, d], observed.information[r, d]
+        pasts.evidence[p, d] = size_evidence(observed.precision[r, d], observed.information[r, d], rules.spread[d])
 
 
 @part
@@ -192,6 +189,7 @@ def keep_past(pasts: Pasts, p: int, others: Pasts, q: int) -> None:
         others.covariance[q, k] = pasts.covariance[p, k]
     for d in range(pasts.precision.shape[1]):
         others.precision[q, d], others.information[q, d] = pasts.precision[p, d], pasts.information[p, d]
+        others.evidence[q, d] = pasts.evidence[p, d]
 
 
 @part
@@ -201,9 +199,10 @@ def continue_past(pasts: Pasts, q: int, r: int, now: float, observed: ObservedRo
     correct_place(pasts.state, pasts.covariance, q, since, observed.ground, observed.variance, r, rules.turn)
     pasts.last[q], pasts.seconds[q] = r, now
     for d in range(pasts.precision.shape[1]):
-        kept = share_kept(pasts.precision[q, d], since, rules.drift[d])
-        pasts.precision[q, d] = kept * pasts.precision[q, d] + observed.precision[r, d]
-        pasts.information[q, d] = kept * pasts.information[q, d] + observed.information[r, d]
+        if observed.precision[r, d] != 0.0:
+            pasts.precision[q, d] += observed.precision[r, d]
+            pasts.information[q, d] += observed.information[r, d]
+            pasts.evidence[q, d] = size_evidence(pasts.precision[q, d], pasts.information[q, d], rules.spread[d])
 
 
 @part
@@ -245,7 +244,5 @@ class Rules(NamedTuple):
     """Variance of the velocity of a new person."""
     spread: Floats
     """float64 (size,): variance of each size among people."""
-    drift: Floats
-    """float64 (size,): variance that a person's apparent size gains in a second."""
     most_against: Floats
     """float64 (size,): greatest evidence of an appearance for a new person, nats times variance."""
