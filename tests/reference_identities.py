@@ -10,7 +10,7 @@ from stseg.config import MotionConfig
 from stseg.identities.evidence.observations import Observations
 from stseg.tracking.filter.motion_model import process_noise, transition
 
-BIRTH, BORDER_BIRTH, ABSENCE, LEAST = 6.0, 2.0, 1.0, -25.0
+BIRTH, ABSENCE, LEAST = 6.0, 1.0, -25.0
 
 
 def partitions(rows: int) -> Iterator[list[int]]:
@@ -36,8 +36,7 @@ def score(seen: Observations, names: list[int], spread: Floats, motion: MotionCo
         own = [row for row, other in enumerate(names) if other == name]
         if len(set(seconds[own])) < len(own) or (np.diff(seconds[own]) > longest).any():
             return -np.inf
-        born = BORDER_BIRTH + (BIRTH - BORDER_BIRTH) * seen.rows.inside[name]
-        total += path(seen, own, seconds, motion) - born + sizes(seen, own, spread)
+        total += path(seen, own, seconds, motion) - BIRTH * seen.rows.inside[name] + sizes(seen, own, spread)
         if seconds[-1] - seconds[own[-1]] > longest:
             total -= BIRTH * seen.rows.inside[own[-1]]
     broken = [row for row in np.flatnonzero(seen.rows.certain) if names[row] != names[seen.rows.previous[row]]]

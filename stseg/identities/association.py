@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from stseg.records.tables import KNOWN_PERSON
 from stseg.tracking.row_groups import isolated_tracklets, rows_of_tracks
 
 _DRAFT_DIVISOR = 4
-"""Divisor of the number of hypotheses in the draft search; sizes and appearance are learned from its identities."""
+"""Divisor of the number of hypotheses in the draft search; appearance is learned from its identities."""
 NO_KNOWN_PEOPLE: Rows = np.zeros(0, KNOWN_PERSON)
 """No people of earlier recordings."""
 
@@ -58,26 +59,29 @@ class IdentityProblem:
 
         `trajectory` is TRAJECTORY (n,) in any order, `sizes` are those of each row, and `appearance` are parts,
         APPEARANCE (l,) each (`row_means`). `frame_rate` is in frames per second; people come and go at the border. The
-        constraints are pairs of rows that are one person, or two: identities from which sizes and appearance are
-        learned obey them.
+        constraints are pairs of rows that are one person, or two: identities from which appearance is learned obey
+        them.
         """
-        frame, tracklets = trajectory["frame"], isolated_tracklets(trajectory, frame_rate)
-        appearances, tracking = row_looks(trajectory, appearance), config.tracking
+        tracklets, tracking = isolated_tracklets(trajectory, frame_rate), config.tracking
         limits = SearchLimits(tracking.hypotheses, tracking.maximum_gap, tracking.identity_lag)
+        model = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate)
 
-        def problem(people: Sequence[Ints]) -> IdentityProblem:
-            learned = LearnedAppearance.nothing(len(trajectory))
-            if any(np.isfinite(value[:, 0]).any() for value in appearances):
-                learned = learn_appearance(frame, appearances, tracklets, _person_of(people), frame_rate)
-            model = SizeModel.joined([learn_sizes(sizes, frame, people, frame_rate), learned.model])
+        def problem(learned: LearnedAppearance) -> IdentityProblem:
+            joined = SizeModel.joined([model, learned.model])
             columns = [*sizes.value.T, *learned.value.T]
-            observations = observe(trajectory, columns, model, frame_rate, border, config)
-            return cls(observations, model, config.motion, limits, frame_rate, learned.colours)
+            observations = observe(trajectory, columns, joined, frame_rate, border, config)
+            return cls(observations, joined, config.motion, limits, frame_rate, learned.colours)
 
-        # Tracklets are right, but errors outlast them; identities last, and few of them are wrong.
-        draft = problem(tracklets).with_hypotheses(-(-tracking.hypotheses // _DRAFT_DIVISOR))
-        by_time = np.argsort(frame, kind="stable")
-        return problem([by_time[rows] for rows in rows_of_tracks(draft.solve(constraints)[by_time])])
+        def learned() -> LearnedAppearance:
+            appearances = row_looks(trajectory, appearance)
+            if not any(np.isfinite(value[:, 0]).any() for value in appearances):
+                return LearnedAppearance.nothing(len(trajectory))
+            by = partial(learn_appearance, trajectory["frame"], appearances, tracklets, frame_rate=frame_rate)
+            # Tracklets are right, but appearance outlasts them; identities last, and with appearance few are wrong.
+            drafted = -(-tracking.hypotheses // _DRAFT_DIVISOR)
+            return by(problem(by(_tracklet_of(tracklets))).with_hypotheses(drafted).solve(constraints))
+
+        return problem(learned())
 
     def with_hypotheses(self, number: int) -> IdentityProblem:
         """The problem with another number of hypotheses."""
@@ -121,10 +125,10 @@ class IdentityProblem:
         return search_identities(part, self.model, self.motion, self.limits, bound).score
 
 
-def _person_of(people: Sequence[Ints]) -> Ints:
-    """The first row of the person of each row."""
-    first = np.empty(sum(map(len, people)), np.int64)
-    for rows in people:
+def _tracklet_of(tracklets: Sequence[Ints]) -> Ints:
+    """The first row of the tracklet of each row."""
+    first = np.empty(sum(map(len, tracklets)), np.int64)
+    for rows in tracklets:
         first[rows] = rows[0]
     return first
 

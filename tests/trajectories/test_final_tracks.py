@@ -88,7 +88,6 @@ def test_events_of_a_swap_are_under_the_names_that_are_right() -> None:
 @pytest.mark.parametrize(("other_height", "doubts"), [(1.7, [(1, 2)]), (1.9, [])])
 def test_a_meeting_that_no_evidence_decides_is_a_doubt(other_height: float, doubts: list[tuple[int, int]]) -> None:
     rows = committed(rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), other_height, range(160))}))
-    rows["height"] = np.where(rows["id"] == 1, 1.7, other_height)
     events = whole(rows, events_of()).events
     found = events[events["kind"] == b"doubt"]
     assert [(int(e["id"]), int(e["other"])) for e in found] == doubts

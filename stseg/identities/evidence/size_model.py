@@ -1,4 +1,4 @@
-"""Errors and spread of people's sizes, learned from rows of each person (docs/how-it-works.md, Tracks).
+"""Errors and spread of people's sizes, learned from isolated tracklets (docs/how-it-works.md, Tracks).
 
 A measured size is x = mean + person + error. A part of the error lasts (`stseg.noise.lasting_error`); the person's
 part has the variance `spread` among people. A size of spread 0 says nothing of identity.
@@ -21,8 +21,8 @@ _PRIOR_PEOPLE = 4.0
 """Weight of the prior of the spread: pairs of tracklets."""
 _PRIOR_TIME = 0.5
 """Prior time constant of an error, seconds."""
-_BEARING = LastingError(np.array(0.0), np.array(0.007**2), np.array(5.0))
-"""Error of a height beside what is learned, square metres: how people walk and stoop lasts longer than tracklets.
+_POSTURE = LastingError(np.array(0.0), np.array(0.005**2), np.array(5.0))
+"""Error of a height by posture beside what is learned, square metres and seconds: it lasts longer than most tracklets.
 Without it, the many frames of a person who stoops are surely of two people."""
 _FARTHEST = 4.0
 """Deviation of a row's size from which it is no size of the person, standard deviations: those who sit or bend."""
@@ -97,7 +97,7 @@ class SizeModel:
         return precision, information
 
 
-def learn_sizes(sizes: MeasuredSizes, frame: Ints, people: Sequence[Ints], frame_rate: float) -> SizeModel:
+def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], frame_rate: float) -> SizeModel:
     """Statistics of the sizes of a recording.
 
     Parameters
@@ -106,13 +106,13 @@ def learn_sizes(sizes: MeasuredSizes, frame: Ints, people: Sequence[Ints], frame
         Of each row.
     frame : int64 (n,)
         Frame of each row.
-    people
-        Rows of each person as far as it is known, an isolated tracklet or an identity, in the order of time.
+    tracklets
+        Rows of each isolated tracklet, in the order of time.
     frame_rate
         Frames per second.
     """
     columns = zip(sizes.value.T, sizes.priors, strict=True)
-    learned = [_learn(column, frame, people, prior, frame_rate) for column, prior in columns]
+    learned = [_learn(column, frame, tracklets, prior, frame_rate) for column, prior in columns]
     mean, variance, row_variance, spread = np.array(learned, np.float64).reshape(-1, 4).T
     return SizeModel(mean, variance, row_variance, spread, np.full(len(learned), np.inf))
 
@@ -135,7 +135,7 @@ def _learn(
     measured = measured_tracklets(size, tracklets)
     mean = float(np.mean(size[np.concatenate(measured)])) if measured else 0.0
     errors = constant_errors(size[None], frame, measured, prior.errors(), frame_rate)
-    row_variance = float(errors.row_variance(frame_rate)[0] + _BEARING.row_variance(frame_rate))
+    row_variance = float(errors.row_variance(frame_rate)[0] + _POSTURE.row_variance(frame_rate))
     return mean, float(errors.variance[0]), row_variance, _spread(size - mean, measured, prior)
 
 

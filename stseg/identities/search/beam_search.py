@@ -20,9 +20,8 @@ from stseg.identities.search.beam import Frames, extend_beam
 from stseg.identities.search.constraints import NO_CONSTRAINTS, ConstrainedPeople, Constraints
 from stseg.identities.search.hypotheses import Hypotheses, Pasts, Rules
 
-_BIRTH, _BORDER_BIRTH = 6.0, 2.0
-"""Cost of a birth or a death inside the area, and of a birth at its border, nats (per square metre): were that free, a
-person who turns there would be cut in two."""
+_BIRTH = 6.0
+"""Cost of a birth or a death inside the area, nats (per square metre)."""
 _ABSENCE = 1.0
 """Cost of being unseen, nats per second."""
 _ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0
@@ -161,7 +160,6 @@ def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rule
     """The constants of the search."""
     return Rules(
         _BIRTH,
-        _BORDER_BIRTH,
         _ABSENCE,
         limits.longest,
         _ALTERNATIVE_LOSS,

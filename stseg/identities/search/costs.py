@@ -44,7 +44,7 @@ def row_costs(
         for d in range(sizes):
             alone[i, d] = size_evidence(observed.precision[r, d], observed.information[r, d], rules.spread[d])
             evidence += alone[i, d]
-        costs.begun[i] = rules.border_birth + (rules.birth - rules.border_birth) * observed.inside[r] - evidence
+        costs.begun[i] = rules.birth * observed.inside[r] - evidence
     for p in range(size):
         _fill_costs(pasts, p, first, now, observed, rules, alone, costs)
     return costs

@@ -228,8 +228,6 @@ class Rules(NamedTuple):
 
     birth: float
     """Cost of a birth or a death inside the area, nats."""
-    border_birth: float
-    """Cost of a birth at the border, nats."""
     absence: float
     """Cost of being unseen, nats per second."""
     longest: float
