@@ -204,8 +204,10 @@ def test_a_near_body_is_no_small_one_at_the_far_border(place: tuple[float, float
     assert np.hypot(*(found - near_body[:, :2]).T).max() < 0.5
 
 
-def test_animals_are_found_by_boxes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("source", ["boxes", "masks"])
+def test_animals_are_found(tmp_path: Path, source: str) -> None:
     simulate(tmp_path / "a", scene="animals", seconds=3.0, size="240,180")
-    run = stseg.track(tmp_path / "a" / "rig_boxes.toml", volume="none")
+    run = stseg.track(tmp_path / "a" / f"rig_{source}.toml", volume="none")
+    assert 0.5 < np.median(run.tracks["height"]) < 0.7
     scores = stseg.evaluate(run.trajectory, read_tracks_csv(tmp_path / "a" / "truth.csv"), frames=run.frames)
     assert scores.moda is not None and scores.moda > 95

@@ -1,10 +1,9 @@
 """Body heights and widths, by HW12's refinement (eqs 25 to 28).
 
-E step: the sizes of one person on a lattice around the population's mean, heights first, then widths. Over all that
-the lattice's pillars cover, the person's own pixels speak for a pillar inside it and against it outside, background
-speaks against it inside, other people's pixels say nothing (they may hide anything). A pixel that is foreground with
-probability o is o own and 1 - o background. Less what is the same for all pillars R of the lattice, one view says of
-each
+E step: the sizes of one person on a lattice, heights first, then widths. Over all that the lattice's pillars cover, the
+person's own pixels speak for a pillar inside it and against it outside, background speaks against it inside, other
+people's pixels say nothing (they may hide anything). A pixel that is foreground with probability o is o own and 1 - o
+background. Less what is the same for all pillars R of the lattice, one view says of each
 
     observations * sum_R (2 o OWN + (1 - o) BACKGROUND) / mean area of these pillars     nats,
 
@@ -31,7 +30,7 @@ from stseg.records.sizes import Sizes, log_heavy_tailed
 _LATTICE_SIZE = 25
 """Sizes on the lattice."""
 _HEIGHTS = np.linspace(0.75, 2.19, _LATTICE_SIZE)
-"""Heights of the lattice, metres: children to the tallest."""
+"""Heights of the lattice, metres, where the mean is that of people: children to the tallest."""
 _WIDTHS = np.linspace(0.26, 0.86, _LATTICE_SIZE)
 """Widths of the lattice, metres: the slim to coats, bags and prams."""
 
@@ -58,10 +57,11 @@ def body_sizes(
     if not measured or not len(width):
         return replace(found, height=places.height, height_variance=places.height_variance)
     each, all_steps = (len(width), 1), (1, _LATTICE_SIZE)
+    heights = _HEIGHTS * (measured[0].view.body.height_mean / BodyConfig.height_mean)
     score = _score(
-        places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured, assignment.number
+        places.ground, np.tile(heights, each), np.tile(width[:, None], all_steps), measured, assignment.number
     )
-    height, height_variance = _posterior(_HEIGHTS, score, body.height_mean, body.height_spread)
+    height, height_variance = _posterior(heights, score, body.height_mean, body.height_spread)
     score = _score(
         places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured, assignment.number
     )
