@@ -1,6 +1,6 @@
 """Links between candidates of a window that may be the same body in two frames, and their gains.
 
-    b_ij = birth cost_j + death cost_i + log [ N(m_j - m_i; 0, S_ij) / (prior odds / s^2) ] + height ratio - absence
+    b_ij = birth cost_j + death cost_i + log(s^2 / sqrt|S_ij|) - d_ij^2 / 2 - prior log-odds + height ratio - absence
 
 A link saves the birth of the later candidate and the death of the earlier one, and adds how much likelier the later
 place is as the continuation of the earlier one than as the place of any other person.
@@ -27,6 +27,8 @@ Links = tuple[Ints, Ints, Floats]
 class WindowCandidates:
     """Candidates of all frames of a window, by rising frame."""
 
+    frames: int
+    """Number of frames of the window."""
     frame: Ints
     """int64 (n,): counted from the window's first."""
     ground: Floats

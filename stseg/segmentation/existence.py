@@ -10,8 +10,9 @@ variable x_i for each; a link i -> j says that candidate j of a later frame is t
 Without links a candidate pays for its birth and its death; a link saves both. Birth and death cost nothing at the
 border of the scene and at the ends of the window. Links form paths: each candidate has at most one predecessor and one
 successor, by a minimum-cost flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame
-that are closer than the reach of a body exclude each other, since their evidence is the same. Links are submodular,
-exclusions are not: roof duality. A path through a candidate that another one excludes falls apart.
+that are closer than the reach of a body exclude each other, unless both are people of the detector: their evidence is
+the same. Links are submodular, exclusions are not: roof duality. A path through a candidate that another one excludes
+falls apart.
 """
 
 from collections.abc import Callable
@@ -46,8 +47,6 @@ class Existence:
     """int64 (n,): link of each candidate, -1 for none."""
     log_odds: Floats
     """float64 (n,): marginal log-odds of each candidate along its path, nats."""
-    gap: float
-    """Bound on the distance from the least energy, given the links, nats."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class ExistenceModel:
         """Candidates that are real, and the links between them."""
         n = len(found)
         if not n:
-            return Existence(np.zeros(0, bool), np.zeros(0, np.int64), np.zeros(0), 0.0)
+            return Existence(np.zeros(0, bool), np.zeros(0, np.int64), np.zeros(0))
         gain, birth, death = self._gains(found)
         links, exclusions = self.links.between(found, birth, death), self._exclusions(found)
         return _solve(gain, links, exclusions, cut)
@@ -75,7 +74,7 @@ class ExistenceModel:
         """g, and in it the costs of birth and death, nats, float64 (n,) each."""
         inside = self.detection.birth_cost * self.border.inside(found.ground, self.detection.border_width)
         birth = np.where(found.frame == 0, 0.0, inside)
-        death = np.where(found.frame == found.frame.max(), 0.0, inside)
+        death = np.where(found.frame == found.frames - 1, 0.0, inside)
         tall = log_population_height(found.height, self.body)
         return found.evidence + self.detection.prior_log_odds + tall - birth - death, birth, death
 
@@ -109,7 +108,7 @@ def _solve(gain: Floats, links: Links, exclusions: Exclusions, cut: Callable[...
         np.concatenate([_quanta(-bonus), np.full(len(one), round(_EXCLUSION_PENALTY / QUANTUM), np.int64)]),
     )
     least: QuadraticMinimum = minimise(energy, cut)
-    return Existence(least.labels, successor, path_marginals(gain, start, end, bonus), least.gap * QUANTUM)
+    return Existence(least.labels, successor, path_marginals(gain, start, end, bonus))
 
 
 def _quanta(nats: Floats) -> Ints:

@@ -83,9 +83,8 @@ def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
         return np.concatenate([getattr(one, name) for one in people])
 
     evidence = joined("evidence") - joined("prior")
-    return WindowCandidates(
-        frame, joined("ground"), joined("covariance"), joined("height"), evidence, np.concatenate(tracks)
-    )
+    places = frame, joined("ground"), joined("covariance"), joined("height")
+    return WindowCandidates(len(frames), *places, evidence, np.concatenate(tracks))
 
 
 def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> Ints:

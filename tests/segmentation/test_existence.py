@@ -34,7 +34,7 @@ def candidates(*rows: tuple[int, float, float, float, int]) -> WindowCandidates:
     n = len(table)
     covariance = np.tile(np.eye(2) * 0.05**2, (n, 1, 1))
     frame, track = table[:, 0].astype(np.int64), table[:, 4].astype(np.int64)
-    return WindowCandidates(frame, table[:, 1:3], covariance, np.full(n, 1.7), table[:, 3], track)
+    return WindowCandidates(len(WALK), frame, table[:, 1:3], covariance, np.full(n, 1.7), table[:, 3], track)
 
 
 def decide(found: WindowCandidates) -> Existence:
@@ -59,10 +59,16 @@ def test_rejected_candidates_alone_are_nobody() -> None:
     assert decision.real.all()
     assert (tracks_of(found, decision, np.ones(18, bool)) == found.track).all()
     none, numbers = np.zeros(0), np.zeros(0, np.int64)
-    empty = WindowCandidates(numbers, np.zeros((0, 2)), np.zeros((0, 2, 2)), none, none, numbers)
+    empty = WindowCandidates(9, numbers, np.zeros((0, 2)), np.zeros((0, 2, 2)), none, none, numbers)
     assert len(decide(empty).real) == 0
     found = replace(candidates(*walk(np.full(9, 3.0), off=0.1)), height=np.full(9, 1.05))
     assert decide(found).real.all()
+
+
+def test_only_the_last_frame_of_a_window_has_free_deaths() -> None:
+    """A glimpse in the middle pays for its birth and its death, though nothing is seen later; in the last it may stay."""
+    glimpse = candidates((3, 0.0, 0.0, 12.0, 1))
+    assert not decide(glimpse).real.any() and decide(replace(glimpse, frames=4)).real.all()
 
 
 def test_candidates_are_added_in_paths_one_for_a_body() -> None:
@@ -71,7 +77,7 @@ def test_candidates_are_added_in_paths_one_for_a_body() -> None:
     found = candidates(*walk(weak), *double)
     decision = decide(found)
     assert np.bincount(found.frame[decision.real]).tolist() == [1] * 9
-    assert (found.ground[decision.real, 1] == 0).all() and decision.gap == 0
+    assert (found.ground[decision.real, 1] == 0).all()
     weak = np.array([3.0, 3.0, 12.0, 12.0, 3.0, 12.0, 12.0, 3.0, 3.0])
     found = candidates(*walk(weak))
     decision = decide(found)
