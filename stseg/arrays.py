@@ -32,6 +32,11 @@ def by_track(table: Rows) -> list[Rows]:
     return np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(table) else []
 
 
+def ground_of(rows: Rows) -> Floats:
+    """Ground points x and y of rows, metres, float64 (n, 2)."""
+    return np.column_stack([rows["x"], rows["y"]]).astype(float, copy=False)
+
+
 def some_columns(table: Rows, dtype: np.dtype[np.void], order: Ints | None = None) -> Rows:
     """A copy of the columns of a dtype, the rows in an order."""
     rows = np.empty(len(table), dtype)

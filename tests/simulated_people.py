@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from scenes import looking
 
 from stseg import Camera, Config, Grid, Rig
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Floats, Ints, Rows
 from stseg.calibration.automatic.endpoints import Endpoints
 from stseg.calibration.automatic.solution import CalibrationInput
 from stseg.records.border import Border
 from stseg.records.tables import TRAJECTORY
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig
+from stseg.trajectories.smoother import smooth_places
 
 RATE = 8.0
 CONFIG = Config()
@@ -51,6 +52,16 @@ def committed(rows: Rows) -> Rows:
     found["xx"] = found["yy"] = 0.02
     found["extent"] = 0.5
     return found
+
+
+def smoothed_paths(frame: Ints, ground: Floats, noise: Floats, rate: float, track: Ints) -> tuple[Floats, Floats]:
+    """Smoothed places (n, 2) and covariances (n, 2, 2) of measured ones, each of a frame and a track."""
+    rows = np.zeros(len(frame), TRAJECTORY)
+    rows["frame"], rows["id"], (rows["raw_x"], rows["raw_y"]) = frame, track, ground.T
+    rows["xx"], rows["xy"], rows["yy"] = noise.reshape(-1, 4)[:, [0, 1, 3]].T
+    smooth_places(rows, rate, CONFIG.motion)
+    covariance = np.stack([rows["xx"], rows["xy"], rows["xy"], rows["yy"]], 1).reshape(-1, 2, 2)
+    return np.column_stack([rows["x"], rows["y"]]), covariance
 
 
 def visit(side: float) -> Path:

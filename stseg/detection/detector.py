@@ -221,8 +221,7 @@ class Detector:
         self, explanation: Explanation, observations: ViewObservations, excluded: Flags
     ) -> Explanation:
         """A frame's explanation with the residuals of excluded views, too: a camera that was moved shows in them."""
-        people = explanation.people
-        bodies = Candidates(people.ground, people.height, people.width)
+        bodies = explanation.people.candidates
         of_excluded = [o if is_excluded else None for o, is_excluded in zip(observations, excluded, strict=True)]
         owners = [
             np.zeros(0, np.int64) if o is None else nearest_people(bodies, view, o)

@@ -11,6 +11,7 @@ from stseg.detection.ghosts import candidate_prior_log_odds, rejected_candidates
 from stseg.detection.problem import BoxEvidence, DetectionProblem
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.refined_people import RefinedPeople, refined_members
+from stseg.geometry.distances import distances
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation, People
 from stseg.view_health.reprojection_residuals import reprojection_residuals
@@ -20,8 +21,7 @@ def explained_frame(estimate: MapEstimate) -> Explanation:
     """The explanation by a final estimate: its members are refined, residuals measured."""
     explanation = explained_by(estimate, refined_members(estimate))
     people, evidence = explanation.people, estimate.evidence
-    bodies = Candidates(people.ground, people.height, people.width)
-    residual = reprojection_residuals(bodies, evidence.views, evidence.observations, estimate.box_assignment)
+    residual = reprojection_residuals(people.candidates, evidence.views, evidence.observations, estimate.box_assignment)
     return replace(explanation, residual=residual)
 
 
@@ -66,7 +66,7 @@ def _outside_core(refined: Floats, members: Ints, problem: DetectionProblem) -> 
     room = problem.parameters.hard_core * (breadth[:, None] + breadth) / 2
     np.fill_diagonal(room, 0.0)
     while True:
-        is_inside = (np.hypot(*np.moveaxis(ground[:, None] - ground, -1, 0)) < room).any(1) & ~is_reset
+        is_inside = (distances(ground, ground) < room).any(1) & ~is_reset
         if not is_inside.any():
             return ground
         is_reset |= is_inside

@@ -25,6 +25,7 @@ from stseg.detection.evidence.birth_lattice import lattice_candidates
 from stseg.detection.explanation import explained_by
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.refined_people import followed_members
+from stseg.geometry.distances import distances
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
 
@@ -76,7 +77,7 @@ def _largest_displacement(before: Candidates, after: Candidates) -> float:
 def _are_separate(estimate: MapEstimate) -> bool:
     """Whether no two members touch, or nearly."""
     ground = estimate.pool.ground[estimate.members]
-    distance = np.hypot(*(ground[:, None] - ground).transpose(2, 0, 1))
+    distance = distances(ground, ground)
     np.fill_diagonal(distance, np.inf)
     return bool((distance >= estimate.evidence.parameters.minimum_distance + _PREDICTION_DISTANCE).all())
 
@@ -104,5 +105,5 @@ def _possible_births(estimate: MapEstimate, lattice_ground: Floats) -> Candidate
 def _outside_core(peaks: Candidates, estimate: MapEstimate) -> Candidates:
     """Candidates outside the hard cores of all members: edges of silhouettes leave some within them in most frames."""
     ground, core = estimate.pool.ground[estimate.members], estimate.evidence.parameters.hard_core
-    distance = np.hypot(*(peaks.ground[:, None] - ground).transpose(2, 0, 1)).min(1, initial=np.inf)
+    distance = distances(peaks.ground, ground).min(1, initial=np.inf)
     return peaks.at(np.flatnonzero(distance >= core))

@@ -135,8 +135,8 @@ def identity_problem(
     rig: Rig, config: Config, committed: Rows, appearance: Rows, constraints: Constraints = NO_CONSTRAINTS
 ) -> IdentityProblem:
     """Identities of the committed rows, as a problem of which single decisions can be tried."""
-    bridged, sizes = bridged_rows(committed, rig.frame_rate, config)
-    return IdentityProblem.of(bridged, sizes, (appearance,), rig.frame_rate, Border.of(rig), config, constraints)
+    bridged = bridged_rows(committed, rig.frame_rate, config.tracking)
+    return IdentityProblem.of(bridged, (appearance,), rig.frame_rate, Border.of(rig), config, constraints)
 
 
 def box_tables(image_rig: Rig, breadth: float) -> list[BodyTable]:

@@ -14,7 +14,7 @@ from stseg.identities.evidence.appearance_axes import Axes
 from stseg.identities.evidence.appearance_model import LearnedAppearance, learn_appearance, row_looks
 from stseg.identities.evidence.observations import Observations, observe
 from stseg.identities.evidence.returns import Visits, pooled_visits
-from stseg.identities.evidence.size_model import MeasuredSizes, SizeModel, learn_sizes
+from stseg.identities.evidence.size_model import SizeModel, learn_heights
 from stseg.identities.search.beam_search import SearchLimits, search_identities
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
@@ -48,7 +48,6 @@ class IdentityProblem:
     def of(
         cls,
         trajectory: Rows,
-        sizes: MeasuredSizes,
         appearance: Iterable[Rows],
         frame_rate: float,
         border: Border,
@@ -57,18 +56,18 @@ class IdentityProblem:
     ) -> IdentityProblem:
         """The problem of a run; sizes and appearance are learned from it.
 
-        `trajectory` is TRAJECTORY (n,) in any order, `sizes` are those of each row, and `appearance` are parts,
-        APPEARANCE (l,) each (`row_means`). `frame_rate` is in frames per second; people come and go at the border. The
-        constraints are pairs of rows that are one person, or two: identities from which appearance is learned obey
-        them.
+        `trajectory` is TRAJECTORY (n,) in any order, `appearance` are parts, APPEARANCE (l,) each (`row_means`).
+        `frame_rate` is in frames per second; people come and go at the border. The constraints are pairs of rows that
+        are one person, or two: identities from which appearance is learned obey them.
         """
         tracklets, tracking = isolated_tracklets(trajectory, frame_rate), config.tracking
         limits = SearchLimits(tracking.hypotheses, tracking.maximum_gap, tracking.identity_lag)
-        model = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate)
+        height = trajectory["height"].astype(float)
+        model = learn_heights(height, trajectory["frame"], tracklets, frame_rate, config)
 
         def problem(learned: LearnedAppearance) -> IdentityProblem:
             joined = SizeModel.joined([model, learned.model])
-            columns = [*sizes.value.T, *learned.value.T]
+            columns = [height, *learned.value.T]
             observations = observe(trajectory, columns, joined, frame_rate, border, config)
             return cls(observations, joined, config.motion, limits, frame_rate, learned.colours)
 
@@ -90,7 +89,7 @@ class IdentityProblem:
     def solve(self, constraints: Constraints = NO_CONSTRAINTS) -> Ints:
         """The first row of the identity of each row, int64 (n,)."""
         order, first = self.observations.order, np.empty(len(self.observations.order), np.int64)
-        bound = constraints.renumbered(np.argsort(order))
+        bound = constraints.renumbered(self.observations.number)
         first[order] = order[search_identities(self.observations, self.model, self.motion, self.limits, bound).name]
         return first
 
@@ -107,7 +106,8 @@ class IdentityProblem:
         value[:, 0], number[:, 0] = earlier["height"], earlier["height_count"]
         if self.colours is not None and len(earlier):
             axes = self.colours.of(earlier["colours"])
-            value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, earlier["appearance_count"][:, None]
+            first = value.shape[1] - axes.shape[1]
+            value[:, first:], number[:, first:] = axes, earlier["appearance_count"][:, None]
         precision, information = self.model.evidence([*value.T])
         return visits.after(earlier["id"], number * precision, number * information)
 

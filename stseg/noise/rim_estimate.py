@@ -52,8 +52,8 @@ class RimEstimate:
         Number of views.
     body
         Sizes of the configured population.
-    miss_rate
-        Usual share of a body that is background, 0..1.
+    config
+        Usual rates of misses and clutter.
     frame_rate
         Frames per second.
     learning

@@ -27,7 +27,7 @@ class Candidates:
         return Candidates(*map(np.concatenate, pairs))
 
     def joined_if_distant(self, other: Candidates, distance: float) -> Candidates:
-        """This pool's candidates, then those of the other that stand `apart` metres or more from all before them."""
+        """This pool's candidates, then those of the other that stand `distance` metres or more from all before them."""
         joined = self.joined_with(other)
         kept = list(range(len(self)))
         for i in range(len(self), len(joined)):

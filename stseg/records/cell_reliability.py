@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Rows, Singles
+from stseg.arrays import Flags, Floats, Rows, Singles, ground_of
 from stseg.bodies.pillars import inside_bodies
 from stseg.geometry.grid import Grid
 from stseg.geometry.nearest_person import nearest_person
@@ -48,8 +48,7 @@ def count_cells(log_odds: Singles, filled: Flags, counted: Flags) -> CellCounts:
 
 def doubtful_cells(grid: Grid, log_odds: Singles, rows: Rows) -> Flags:
     """Cells that are seen, and in doubt or near a row of the frame, bool (plane, y, x)."""
-    ground = np.column_stack([rows["x"], rows["y"]]).astype(float)
-    near_person = nearest_person(grid.ground, ground, PERSON_RADIUS) >= 0
+    near_person = nearest_person(grid.ground, ground_of(rows), PERSON_RADIUS) >= 0
     return np.asarray(np.isfinite(log_odds) & ((np.abs(log_odds) < CERTAIN_LOG_ODDS) | near_person))
 
 

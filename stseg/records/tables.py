@@ -46,7 +46,7 @@ TRACK = np.dtype(
 """One row per track."""
 
 BOX = columns("frame:<i8 id:<i8 view:<i4 left:<f4 top:<f4 width:<f4 height:<f4")
-"""A track's box in one view, pixels: around its localisation over all planes."""
+"""A track's box in one view, pixels: around a body of its height at its place."""
 
 EVENT = columns("frame:<i8 kind:S12 id:<i8 other:<i8 reason:S96")
 """birth, death, merge, split, hand-over, doubt, return, dropped, blind, crowd; `other` is another track, 0 for none."""

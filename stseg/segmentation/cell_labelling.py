@@ -8,7 +8,6 @@ source set of the greater gains contains those of smaller ones. So only the comp
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -20,18 +19,7 @@ from stseg.graphcut.solvers import Solver
 from stseg.records.blobs import UNASSIGNED
 from stseg.records.predicted_tracks import PredictedPlaces
 from stseg.segmentation.label_energy import BodyShape, label_energy, track_shares
-
-
-class CellPlaces(Protocol):
-    """Where the cells of a window are: a grid, or patches of one."""
-
-    @property
-    def ground(self) -> Floats:
-        """Centres of the cells, metres, float64 (y, x, 2)."""
-
-    @property
-    def heights(self) -> Floats:
-        """Heights of the planes, metres, float64 (plane,)."""
+from stseg.segmentation.patches import GroundPatches
 
 
 @dataclass(frozen=True)
@@ -44,45 +32,36 @@ class WindowDetections:
     """int64 (n,) for each frame: track of each detection."""
 
 
-@dataclass(frozen=True)
-class WindowLabels:
-    """The labels of a window."""
-
-    label: Labels
-    """int32 (time, plane, y, x): track of each cell, UNASSIGNED without one, 0 for background."""
-    cells: int
-    """Number of cells divided by expansion moves; 0 where no two tracks touch."""
-
-
 def label_cells(
     energy: GridEnergy,
     occupied: Flags,
     detections: WindowDetections,
     predicted: PredictedPlaces,
     body: BodyShape,
-    places: CellPlaces,
+    patches: GroundPatches,
     solver: Solver,
-) -> WindowLabels:
-    """Label every cell of the minimum cut, `occupied` bool (time, plane, y, x), by a track or as UNASSIGNED.
+) -> Labels:
+    """Track of every cell, UNASSIGNED without one, 0 outside the minimum cut, int32 (time, plane, y, x).
 
-    `detections` are those of the window's frames; their tracks are all among those of `predicted`, the places of tracks
-    in these frames. `body` is the extent of a body, and `solver` that of the expansion moves.
+    `occupied` bool (time, plane, y, x) is the cut. `detections` are those of the window's frames; their tracks are all
+    among those of `predicted`, the places of tracks in these frames. `body` is the extent of a body, `patches` hold the
+    cells, and `solver` is that of the expansion moves, by which cells are divided where tracks touch.
     """
     subgraph = subset(energy, occupied)
+    label = np.zeros(occupied.shape, np.int32)
     if not len(subgraph.cell):
-        return WindowLabels(np.zeros(occupied.shape, np.int32), 0)
+        return label
     component = subgraph.components()
-    occupied_by, displaced = _occupants(subgraph, component, occupied, detections, predicted, body.reach, places)
+    occupied_by, displaced = _occupants(subgraph, component, occupied, detections, predicted, body.reach, patches)
     count = occupied_by.sum(1)
     track_ids = np.append(predicted.track, UNASSIGNED)
     labels = track_ids[np.where(count == 1, np.argmax(np.column_stack([occupied_by, count != 1]), 1), -1)][component]
     touching = count[component] > 1
     if touching.any():
         present = replace(predicted, expected=predicted.expected & ~displaced)
-        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, places, solver)
-    label = np.zeros(occupied.shape, np.int32)
+        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, patches, solver)
     label.flat[subgraph.cell] = labels
-    return WindowLabels(label, int(touching.sum()))
+    return label
 
 
 def _expanded(
@@ -90,12 +69,12 @@ def _expanded(
     subgraph: CellSubset,
     predicted: PredictedPlaces,
     body: BodyShape,
-    places: CellPlaces,
+    patches: GroundPatches,
     solver: Solver,
 ) -> Ints:
     """Track of each cell of a subgraph, UNASSIGNED or 0, by expansion moves, int64 (n,)."""
     frame, plane, y, x = np.unravel_index(subgraph.cell, energy.unary.shape)
-    share = track_shares(frame, places.ground[y, x], places.heights[plane], predicted, body)
+    share = track_shares(frame, patches.ground[y, x], patches.grid.heights[plane], predicted, body)
     problem = label_energy(energy.unary.ravel()[subgraph.cell], share, subgraph)
     track_ids = np.concatenate([[0], predicted.track, [UNASSIGNED]])
     return np.asarray(track_ids[expand(problem, problem.cheapest_labels(), solver.sparse)])
@@ -108,7 +87,7 @@ def _occupants(
     detections: WindowDetections,
     predicted: PredictedPlaces,
     reach: float,
-    places: CellPlaces,
+    patches: GroundPatches,
 ) -> tuple[Flags, Flags]:
     """Tracks detected in each component, bool (component, k), and outside all components in a frame, bool (time, k).
 
@@ -118,7 +97,7 @@ def _occupants(
     displaced = np.zeros_like(predicted.expected)
     for t, (ground, track) in enumerate(zip(detections.ground, detections.track, strict=True)):
         rows, columns = np.nonzero(occupied[t].any(0))
-        cells_ground = places.ground[rows, columns]
+        cells_ground = patches.ground[rows, columns]
         for detection_ground, k in zip(ground, np.searchsorted(predicted.track, track), strict=True):
             distance = np.hypot(*(cells_ground - detection_ground).T)
             if distance.min(initial=np.inf) > reach / 2:

@@ -51,26 +51,16 @@ class _TrackDensities(NamedTuple):
     height: Floats
 
 
-def track_shares(
-    frame: Ints,
-    ground: Floats,
-    height: Floats,
-    predicted: PredictedPlaces,
-    body: BodyShape,
-    appearance: Floats | None = None,
-) -> Floats:
+def track_shares(frame: Ints, ground: Floats, height: Floats, predicted: PredictedPlaces, body: BodyShape) -> Floats:
     """Share of each track and, last, of UNASSIGNED in each cell, given that the cell is occupied, float64 (n, k + 1).
 
     Shares are 0 outside the gate; rows sum to one. Of each cell are `frame` int64 (n,), counted from the window's
-    first, `ground` float64 (n, 2) and `height` float64 (n,), metres, and `appearance` float64 (n, k), optional: the
-    log-likelihood ratio of its appearance under each track against any body, nats.
+    first, `ground` float64 (n, 2) and `height` float64 (n,), metres.
     """
     disc = body.reach**2 / 4
     spread = predicted.covariance + disc * np.eye(2)
     log_volume = 0.5 * np.log(np.linalg.det(spread)) - math.log(disc)
-    weight = np.zeros((len(frame), len(predicted.track) + 1))
-    if appearance is not None:
-        weight[:, :-1] = appearance
+    weight = np.empty((len(frame), len(predicted.track) + 1))
     precision: Floats = np.asarray(np.linalg.inv(spread), float)
     tracks = _TrackDensities(predicted.expected, predicted.ground, precision, log_volume, predicted.height)
     _fill_log_weights(frame, ground, height, tracks, body.height_spread, weight)
@@ -96,7 +86,7 @@ def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> L
 def _fill_log_weights(
     frame: Ints, ground: Floats, height: Floats, tracks: _TrackDensities, height_spread: float, weight: Floats
 ) -> None:
-    """Add the tracks' log-weights to weight (n, k + 1), nats; -inf outside the gate."""
+    """Fill weight (n, k + 1) with the tracks' log-weights, nats; -inf outside the gate."""
     for i in range(len(frame)):
         t = frame[i]
         for k in range(tracks.ground.shape[1]):
@@ -107,4 +97,4 @@ def _fill_log_weights(
                 weight[i, k] = -np.inf
                 continue
             above = max(height[i] - tracks.height[t, k], 0.0) / height_spread
-            weight[i, k] -= 0.5 * square + tracks.log_volume[t, k] + 0.5 * above * above
+            weight[i, k] = -(0.5 * square + tracks.log_volume[t, k] + 0.5 * above * above)

@@ -50,30 +50,8 @@ class GroundPatches:
         """Patches that hold the marked squares, bool (square row, square column), and all beside them."""
         rows, columns = grid.shape[1:]
         grown = binary_dilation(squares, EIGHT_NEIGHBOURS).repeat(SQUARE_SIDE, 0).repeat(SQUARE_SIDE, 1)
-        return cls._arranged(grid, np.asarray(connected(grown[:rows, :columns], EIGHT_NEIGHBOURS)[0], np.int32))
-
-    @classmethod
-    def whole(cls, grid: Grid) -> Self:
-        """One patch, the whole ground."""
-        return cls._arranged(grid, np.ones(grid.shape[1:], np.int32))
-
-    @classmethod
-    def _arranged(cls, grid: Grid, piece: Labels) -> Self:
-        """Patches of the pieces of the ground (y, x), numbered from 1: on shelves of a sheet, the tallest first."""
-        flat, found = np.arange(piece.size).reshape(piece.shape), find_objects(piece)
-        cells = [np.where(piece[here] == k, flat[here], -1) for k, here in enumerate(found, start=1)]
-        cells.sort(key=len, reverse=True)
-        wide = max([1, math.isqrt(sum(one.size for one in cells)), *(one.shape[1] for one in cells)])
-        rectangles, top, left, tall = [], 0, 0, len(cells[0]) if cells else 1
-        for one in cells:
-            if left + one.shape[1] > wide:
-                top, left, tall = top + tall + 1, 0, len(one)
-            rectangles.append((slice(top, top + len(one)), slice(left, left + one.shape[1])))
-            left += one.shape[1] + 1
-        place = np.full((top + tall, wide), -1, np.int64)
-        for rectangle, one in zip(rectangles, cells, strict=True):
-            place[rectangle] = one
-        return cls(grid, tuple(rectangles), place)
+        piece = np.asarray(connected(grown[:rows, :columns], EIGHT_NEIGHBOURS)[0], np.int32)
+        return cls(grid, *_arranged(piece))
 
     @cached_property
     def ground(self) -> Floats:
@@ -81,11 +59,6 @@ class GroundPatches:
         ground = np.full((*self.place.shape, 2), np.inf)
         ground[self.place >= 0] = self.grid.ground.reshape(-1, 2)[self.place[self.place >= 0]]
         return ground
-
-    @property
-    def heights(self) -> Floats:
-        """Heights of the planes, metres, float64 (plane,)."""
-        return self.grid.heights
 
     @cached_property
     def border(self) -> Flags:
@@ -140,6 +113,24 @@ class GroundPatches:
             to = (row + down.start) * columns + column + across.start
             sheet[:, down, across] = np.where((cells >= 0) & (self.place[down, across] >= 0), to, -1)
         return sheet
+
+
+def _arranged(piece: Labels) -> tuple[tuple[tuple[slice, slice], ...], Ints]:
+    """Rectangles and places of the pieces of the ground (y, x), numbered from 1: on shelves, the tallest first."""
+    flat, found = np.arange(piece.size).reshape(piece.shape), find_objects(piece)
+    cells = [np.where(piece[here] == k, flat[here], -1) for k, here in enumerate(found, start=1)]
+    cells.sort(key=len, reverse=True)
+    wide = max([1, math.isqrt(sum(one.size for one in cells)), *(one.shape[1] for one in cells)])
+    rectangles, top, left, tall = [], 0, 0, len(cells[0]) if cells else 1
+    for one in cells:
+        if left + one.shape[1] > wide:
+            top, left, tall = top + tall + 1, 0, len(one)
+        rectangles.append((slice(top, top + len(one)), slice(left, left + one.shape[1])))
+        left += one.shape[1] + 1
+    place = np.full((top + tall, wide), -1, np.int64)
+    for rectangle, one in zip(rectangles, cells, strict=True):
+        place[rectangle] = one
+    return tuple(rectangles), place
 
 
 def people_squares(grid: Grid, ground: Floats, ahead: Floats, reach: float) -> Flags:

@@ -21,12 +21,9 @@ def best_paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:
     n = len(gain)
     each = np.arange(n)
     # Rows: n candidates as predecessors, n births. Columns: n candidates as successors, n deaths.
-    rows = np.concatenate([each, start, each, n + each, n + end])
-    columns = np.concatenate([each, end, n + each, each, n + start])
-    cost = np.concatenate([np.zeros(n), -gain[end] - bonus, np.zeros(n), -gain, np.zeros(len(start))])
-    free_rows, free_columns = n + each, n + each
-    rows, columns = np.concatenate([rows, free_rows]), np.concatenate([columns, free_columns])
-    cost = np.concatenate([cost, np.zeros(n)])
+    rows = np.concatenate([each, start, each, n + each, n + end, n + each])
+    columns = np.concatenate([each, end, n + each, each, n + start, n + each])
+    cost = np.concatenate([np.zeros(n), -gain[end] - bonus, np.zeros(n), -gain, np.zeros(len(start) + n)])
     cost = np.rint(cost / _QUANTUM)
     lift = 1.0 - cost.min()  # explicit zeros are no edges; every perfect matching has as many
     table = coo_array((cost + lift, (rows, columns)), shape=(2 * n, 2 * n)).tocsr()

@@ -28,7 +28,7 @@ from stseg.records.sparse_labels import SparseLabels
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
-from stseg.segmentation.cell_labelling import WindowDetections, WindowLabels, label_cells
+from stseg.segmentation.cell_labelling import WindowDetections, label_cells
 from stseg.segmentation.cell_motion import PlacedTracks, motion_field, same_tracks
 from stseg.segmentation.cut_energy import build_energy
 from stseg.segmentation.label_energy import BodyShape
@@ -140,7 +140,7 @@ class CutTracker:
         frames = self.existence.revised(around, window.solve_first, window.solve_stop)
         patches, log_odds, energy = self._cut_out(frames)
         cut = self.solver.grid(energy)
-        label = self._divide(window, frames, patches, energy, cut.occupied).label
+        label = self._divide(window, frames, patches, energy, cut.occupied)
         reach = self.config.occupancy.person_radius
         blobs = [
             find_blobs(cells, volume, one.fused.people.ground, one.tracks, reach, patches)
@@ -193,7 +193,7 @@ class CutTracker:
 
     def _divide(
         self, window: Window, frames: list[TrackedFrame], patches: GroundPatches, energy: GridEnergy, occupied: Flags
-    ) -> WindowLabels:
+    ) -> Labels:
         """Label the occupied cells with the filter tracks of this window and of active tracks."""
         tails = [track.tail for track in self.association.active]
         mean_height = self.config.body.height_mean

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows
+from stseg.arrays import Floats, Ints, Rows, ground_of
 from stseg.geometry import Rig
 from stseg.records.tables import EVENT, TRAJECTORY
 
@@ -47,7 +47,7 @@ def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats) -> Rows:
 
 def fill_views(rows: Rows, rig: Rig) -> None:
     """Fill the numbers of views that see the cell above each place, of the plane at which most of them see it."""
-    grid, cell = rig.grid, np.rint(rig.grid.cell_of(np.column_stack([rows["x"], rows["y"]]))).astype(int)
+    grid, cell = rig.grid, np.rint(rig.grid.cell_of(ground_of(rows))).astype(int)
     column, row = cell[:, 0].clip(0, grid.shape[2] - 1), cell[:, 1].clip(0, grid.shape[1] - 1)
     place = np.column_stack([grid.ground_x[column], grid.ground_y[row]])
     views = np.sum([camera.sees(place, grid.heights[:, None]) for camera in rig.cameras], 0)

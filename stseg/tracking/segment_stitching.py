@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Ints, Labels, Rows
+from stseg.arrays import Ints, Labels, Rows, ground_of
 from stseg.geometry.distances import distances
 from stseg.records.tables import EVENT, TRAJECTORY
 from stseg.tracking.filter.assignment import assign
@@ -136,12 +136,8 @@ def matches(before: Rows, lead: Rows) -> dict[int, int]:
     shared = np.zeros((len(earlier), len(later)))
     for frame in np.intersect1d(before["frame"], lead["frame"]).tolist():
         a, b = before[before["frame"] == frame], lead[lead["frame"] == frame]
-        matched = distances(_ground(a), _ground(b)) < _SAME_PLACE_DISTANCE
+        matched = distances(ground_of(a), ground_of(b)) < _SAME_PLACE_DISTANCE
         rows, columns = np.nonzero(matched)
         shared[earlier.searchsorted(a["id"][rows]), later.searchsorted(b["id"][columns])] += 1
     a, b = assign(np.where(shared > 0, -shared, np.inf), 0.0)
     return dict(zip(later[b].tolist(), earlier[a].tolist(), strict=True))
-
-
-def _ground(rows: Rows) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    return np.column_stack([rows["x"], rows["y"]])

@@ -1,11 +1,11 @@
 """From committed rows to the tracks of the whole run (docs/how-it-works.md, Tracks).
 
-committed rows -> short gaps filled -> global association -> short tracks dropped -> smoothed
+committed rows -> short gaps filled -> global association -> short tracks dropped -> short gaps filled, smoothed
                   (smoother)           (identities)          (pruning)               (smoother)
 -> people who come back, where that is wanted
    (returned_tracks)
 
-Global association moves no place: it decides which rows belong to one person, and fills gaps without other people.
+Global association moves no place: it decides which rows belong to one person. Gaps are filled again under identities.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows, columns, some_columns
+from stseg.arrays import Floats, Ints, Rows, columns, ground_of, some_columns
 from stseg.bodies.pillars import BodyTable
 from stseg.config import Config, TrackingConfig
 from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem, Link, associate_globally
 from stseg.identities.evidence.returns import Return
-from stseg.identities.evidence.size_model import MeasuredSizes
 from stseg.identities.review.weighed_doubts import doubt_events
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
@@ -30,7 +29,7 @@ from stseg.records.track_heights import heights
 from stseg.tracking.windows.encounters import encounters
 from stseg.trajectories.pruning import drop_short
 from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
-from stseg.trajectories.smoother import fill_gaps, interpolated_rows, smooth_places
+from stseg.trajectories.smoother import apart_from, filled_gaps, interpolated_rows, smooth_places
 
 _PLACED = columns("frame:<i8 id:<i8 x:<f8 y:<f8")
 """Columns of the rows of the problem that are still asked for once there are tracks."""
@@ -88,8 +87,8 @@ def final_tracks(
 
     People of earlier recordings keep their ids; all others have greater ones.
     """
-    bridged, track, sizes = _bridged(rows.trajectory, frame_rate, config)
-    problem = IdentityProblem.of(bridged, sizes, rows.appearance_parts, frame_rate, border, config, constraints)
+    bridged, track = _bridged(rows.trajectory, frame_rate, config.tracking)
+    problem = IdentityProblem.of(bridged, rows.appearance_parts, frame_rate, border, config, constraints)
     linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
     committed, named = bridged[: len(track)], linked.identity[: len(track)]
@@ -99,7 +98,7 @@ def final_tracks(
     renamed = _renamed(rows.events, _Names(track, committed["frame"], named), linked.links)
     tracks, bridged = bridged[np.isin(bridged["id"], kept)], some_columns(bridged, _PLACED)
     del committed
-    tracks = fill_gaps(tracks, frame_rate, config.tracking, True)
+    tracks = filled_gaps(tracks, apart_from(interpolated_rows(tracks, frame_rate, config.tracking), tracks))
     smooth_places(tracks, frame_rate, config.motion)
     doubts = doubt_events(tracks, bridged[: len(track)], problem, constraints)
     every_event = np.concatenate([renamed, met, dropped, doubts])
@@ -123,22 +122,21 @@ def _with_later_ids(whole: FinalTracks, last_id: int) -> FinalTracks:
 
 def _with_returns(whole: FinalTracks, returns: Sequence[Return], frame_rate: float) -> FinalTracks:
     """The tracks under the ids of people: visits of one person have one id."""
+    if not returns:
+        return whole
     trajectory = renamed_trajectory(whole.trajectory, returns)
     events = renamed_events(whole.events, trajectory, returns, frame_rate)
     return FinalTracks(trajectory, events, renamed_ids(whole.identity, returns))
 
 
-def _bridged(committed: Rows, frame_rate: float, config: Config) -> tuple[Rows, Ints, MeasuredSizes]:
+def _bridged(committed: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Rows, Ints]:
     """As `bridged_rows`, with the track of each committed row."""
-    bridged, sizes = bridged_rows(committed, frame_rate, config)
-    return bridged, committed["id"].copy(), sizes
+    return bridged_rows(committed, frame_rate, config), committed["id"].copy()
 
 
-def bridged_rows(committed: Rows, frame_rate: float, config: Config) -> tuple[Rows, MeasuredSizes]:
-    """Committed rows and those that fill their short gaps after them, with the sizes of all."""
-    gaps = interpolated_rows(committed, frame_rate, config.tracking)
-    sizes = MeasuredSizes.of_heights(committed["height"], config).with_unmeasured(len(gaps))
-    return np.concatenate([committed, gaps]), sizes
+def bridged_rows(committed: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
+    """Committed rows and those that fill their short gaps after them."""
+    return np.concatenate([committed, interpolated_rows(committed, frame_rate, config)])
 
 
 def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: TrackingConfig) -> FinalTracks:
@@ -146,7 +144,8 @@ def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: T
     kept, dropped = drop_short(committed, frame_rate, config)
     every_event = np.concatenate([events, dropped])
     stays, order = np.isin(committed["id"], kept), np.argsort(every_event["frame"], kind="stable")
-    tracks = fill_gaps(committed[stays], frame_rate, config)
+    tracks = committed[stays]
+    tracks = filled_gaps(tracks, interpolated_rows(tracks, frame_rate, config))
     return FinalTracks(tracks, every_event[order], np.where(stays, committed["id"], 0))
 
 
@@ -221,11 +220,10 @@ def box_parts(tables: Sequence[BodyTable], trajectory: Rows) -> Iterator[Rows]:
 
 
 def _boxes_of(tables: Sequence[BodyTable], trajectory: Rows, tall: Floats) -> Rows:
-    ground = np.column_stack([trajectory["x"], trajectory["y"]])
-    every_box = np.zeros((len(trajectory), len(tables)), BOX)
+    every_box, ground = np.zeros((len(trajectory), len(tables)), BOX), ground_of(trajectory)
     visible = np.zeros(every_box.shape, bool)
     for view, table in enumerate(tables):
-        edges, boxes = table.boxes_of(ground, tall).clip(0, [*table.size, *table.size]), every_box[:, view]
+        boxes, edges = every_box[:, view], table.boxes_of(ground, tall).clip(0, [*table.size, *table.size])
         visible[:, view] = (edges[:, 2:] > edges[:, :2]).all(axis=1)
         boxes["frame"], boxes["id"], boxes["view"] = trajectory["frame"], trajectory["id"], view
         boxes["left"], boxes["top"] = edges[:, :2].T

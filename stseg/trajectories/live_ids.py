@@ -1,9 +1,9 @@
 """Provisional identities of a live run: run-wide names for the tracks of segments, and what is decided again.
 
-They follow the stitching of segments (`stitching`) as far as it is known by now; the run file decides
-encounters and gaps again with the whole run (`stseg.trajectories.final_tracks`). Every few seconds the identities of
-the latest minutes are decided as those of a whole run are (`stseg.identities.association`), under the ids that were
-published; where an id holds another person, its rows are corrected.
+They follow the stitching of segments (`stseg.tracking.segment_stitching`) as far as it is known by now; the run file
+decides encounters and gaps again with the whole run (`stseg.trajectories.final_tracks`). Every few seconds the
+identities of the latest minutes are decided as those of a whole run are (`stseg.identities.association`), under the ids
+that were published; where an id holds another person, its rows are corrected.
 """
 
 from collections.abc import Callable, Container, Iterator
@@ -50,8 +50,8 @@ class LiveCorrections:
         return found
 
     def _decided_again(self, decided: int, new_id: Callable[[], int]) -> Rows:
-        bridged, sizes = bridged_rows(self._rows, self._rate, self._config)
-        problem = IdentityProblem.of(bridged, sizes, (self._appearance,), self._rate, self._border, self._config)
+        bridged = bridged_rows(self._rows, self._rate, self._config.tracking)
+        problem = IdentityProblem.of(bridged, (self._appearance,), self._rate, self._border, self._config)
         linked = associate_globally(bridged, problem)
         identity = linked.identity[: len(self._rows)]
         last_id = int(bridged["id"].max())

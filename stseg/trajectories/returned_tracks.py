@@ -39,8 +39,6 @@ def returns_of(
 def renamed_ids(ids: Ints, returns: Sequence[Return]) -> Ints:
     """Ids of visits as those of their people."""
     visit, identity = np.array(sorted((one.visit, one.identity) for one in returns), np.int64).reshape(-1, 2).T
-    if not len(visit):
-        return ids
     at = np.searchsorted(visit, ids).clip(max=len(visit) - 1)
     return np.where(visit[at] == ids, identity[at], ids)
 
@@ -72,7 +70,7 @@ def renamed_events(events: Rows, trajectory: Rows, returns: Sequence[Return], fr
     first = trajectory["frame"][start]
     last = np.zeros(len(ids), np.int64)
     np.maximum.at(last, np.searchsorted(ids, trajectory["id"]), trajectory["frame"])
-    person = np.searchsorted(ids, named["id"]).clip(max=max(len(ids) - 1, 0))
+    person = np.searchsorted(ids, named["id"]).clip(max=len(ids) - 1)
     between = here & (
         ((named["kind"] == b"birth") & (named["frame"] > first[person]))
         | ((named["kind"] == b"death") & (named["frame"] < last[person]))

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows
+from stseg.arrays import Floats, Ints, Rows, ground_of
 from stseg.config import MotionConfig, TrackingConfig
 from stseg.geometry.distances import distances
 from stseg.noise.lasting_error import PLACE_ERROR
@@ -30,10 +30,9 @@ _DRIFT_PER_FRAME = 0.1
 """Growth of a place's standard deviation a frame away from the nearest detection, metres."""
 
 
-def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig, keep_apart: bool = False) -> Rows:
-    """The trajectory with its interpolated rows, or those apart from all others, sorted by frame, then id."""
-    filled = interpolated_rows(trajectory, frame_rate, config)
-    parts = trajectory, _apart_from(filled, trajectory) if keep_apart else filled
+def filled_gaps(trajectory: Rows, interpolated: Rows) -> Rows:
+    """The trajectory with some of its interpolated rows, sorted by frame, then id."""
+    parts = trajectory, interpolated
     order = np.lexsort([np.concatenate([part[name] for part in parts]) for name in ("id", "frame")])
     place, rows = np.empty_like(order), np.empty(len(order), TRAJECTORY)
     place[order] = np.arange(len(order))
@@ -54,20 +53,16 @@ def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfi
     return np.concatenate([np.zeros(0, TRAJECTORY), *(_between(before, after) for before, after in ends)])
 
 
-def _apart_from(rows: Rows, trajectory: Rows) -> Rows:
+def apart_from(rows: Rows, trajectory: Rows) -> Rows:
     """Rows apart from all rows of the trajectory in the same frame: two bodies need two places."""
     free = np.ones(len(rows), bool)
     by_frame = np.argsort(trajectory["frame"], kind="stable")
     frame, order = trajectory["frame"][by_frame], np.argsort(rows["frame"], kind="stable")
     for of_frame in np.split(order, np.flatnonzero(np.diff(rows["frame"][order])) + 1) if len(rows) else ():
         first, stop = np.searchsorted(frame, rows["frame"][of_frame[0]] + np.arange(2))
-        away = distances(_ground(rows[of_frame]), _ground(trajectory[by_frame[first:stop]]))
+        away = distances(ground_of(rows[of_frame]), ground_of(trajectory[by_frame[first:stop]]))
         free[of_frame] = (away >= EXCLUSION_RADIUS).all(axis=1)
     return np.asarray(rows[free])
-
-
-def _ground(rows: Rows) -> Floats:
-    return np.column_stack([rows["x"], rows["y"]])
 
 
 def _between(before: np.void, after: np.void) -> Rows:
@@ -102,33 +97,6 @@ def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> N
         trajectory["x"][rows], trajectory["y"][rows] = ground.T
         for name, value in zip(("xx", "xy", "yy"), covariance.reshape(-1, 4)[:, [0, 1, 3]].T, strict=True):
             trajectory[name][rows] = value
-
-
-def smoothed_paths(
-    seconds: Floats, ground: Floats, noise: Floats, tracks: Sequence[Ints], model: MotionConfig
-) -> tuple[Floats, Floats]:
-    """Smoothed places of tracks.
-
-    Parameters
-    ----------
-    seconds : float64 (n,)
-        Increasing in each track.
-    ground, noise : float64 (n, 2), (n, 2, 2)
-        Measured places and their covariances, metres.
-    tracks
-        Rows of each; every row is of one.
-    model
-        Motion model.
-
-    Returns
-    -------
-    float64 (n, 2), float64 (n, 2, 2)
-        Smoothed places and their covariances.
-    """
-    places, covariance = np.empty(ground.shape), np.empty(noise.shape)
-    for rows, *found in _smoothed_parts(lambda rows: (seconds[rows], ground[rows], noise[rows]), tracks, model):
-        places[rows], covariance[rows] = found
-    return places, covariance
 
 
 _Measured = tuple[Floats, Floats, Floats]

@@ -10,14 +10,12 @@ from simulated_people import BORDER, CONFIG, RATE, Path, committed, gone, rows_o
 from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally
 from stseg.identities.evidence.appearance_model import LearnedAppearance, learn_appearance, row_looks
-from stseg.identities.evidence.size_model import MeasuredSizes
 from stseg.records.tables import APPEARANCE, COLOURS, EVENT, FEATURES, TRAJECTORY
 from stseg.tracking.row_groups import isolated_tracklets
 
 
 def relinked(rows: Rows) -> GlobalAssociation:
-    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    return associate_globally(rows, IdentityProblem.of(rows, sizes, (), RATE, BORDER, CONFIG))
+    return associate_globally(rows, IdentityProblem.of(rows, (), RATE, BORDER, CONFIG))
 
 
 MET = range(72, 89)
@@ -207,8 +205,7 @@ def test_looks_that_last_count_less_and_offsets_are_undone() -> None:
 
 
 def associated(rows: Rows, looks: Rows) -> Ints:
-    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    return associate_globally(rows, IdentityProblem.of(rows, sizes, (looks,), RATE, BORDER, CONFIG)).identity
+    return associate_globally(rows, IdentityProblem.of(rows, (looks,), RATE, BORDER, CONFIG)).identity
 
 
 def test_features_tell_apart_and_are_learned_from_errors() -> None:

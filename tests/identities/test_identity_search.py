@@ -16,7 +16,7 @@ from stseg.commands.correct import correct
 from stseg.errors import FormatError, InputError
 from stseg.identities.association import IdentityProblem, associate_globally
 from stseg.identities.evidence.observations import Observations, observe
-from stseg.identities.evidence.size_model import _POSTURE, MeasuredSizes, SizeModel, SizePrior, learn_sizes
+from stseg.identities.evidence.size_model import _POSTURE, SizeModel, learn_heights
 from stseg.identities.review.answered_constraints import answered_rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.search import beam_search as search
@@ -88,12 +88,12 @@ def test_of_hypotheses_with_the_same_people_the_best_is_kept(
     assert chosen[:number].tolist() == [0, 1][:distinct]
 
 
-def sizes_of(people: Floats, noise: float, seed: int = 0) -> tuple[MeasuredSizes, Ints, list[Ints]]:
-    """A size of each person in 80 frames, one tracklet a person."""
+def heights_of(people: Floats, noise: float, seed: int = 0) -> tuple[Floats, Ints, list[Ints]]:
+    """The height of each person in 80 frames, one tracklet a person."""
     rng = np.random.default_rng(seed)
     value = np.repeat(people, 80) + rng.normal(0, noise, 80 * len(people))
     frame = np.tile(np.arange(80), len(people))
-    return MeasuredSizes(value[:, None], [SizePrior(0.05, 0.1)]), frame, np.split(np.arange(len(value)), len(people))
+    return value, frame, np.split(np.arange(len(value)), len(people))
 
 
 @pytest.mark.parametrize(("most", "low", "people"), [(np.inf, [1.35], 3), (1.0, [1.35], 2), (np.inf, [1.2] * 10, 2)])
@@ -108,22 +108,21 @@ def test_outliers_say_no_more_against_a_person_than_they_may(most: float, low: l
     assert len(np.unique(found)) == people
 
 
-def test_noise_and_spread_of_a_size_are_learned_from_enough() -> None:
+def test_noise_and_spread_of_heights_are_learned_from_enough() -> None:
     people = np.random.default_rng(1).normal(1.7, 0.2, 60)
-    model = learn_sizes(*sizes_of(people, 0.03), RATE)
+    model = learn_heights(*heights_of(people, 0.03), RATE, CONFIG)
     assert model.variance[0] == pytest.approx(0.03**2, rel=0.15)
     assert model.spread[0] == pytest.approx(0.2**2, rel=0.3)
     assert model.row_variance[0] - _POSTURE.row_variance(RATE) < 3 * model.variance[0]
-    assert learn_sizes(*sizes_of(np.full(400, 1.7), 0.03), RATE).spread[0] < 0.012**2
+    assert learn_heights(*heights_of(np.full(400, 1.7), 0.03), RATE, CONFIG).spread[0] < 0.012**2
     rows = rows_of({1: (visit(-1), 1.7, range(40))})
     tracklets = isolated_tracklets(rows, RATE)
-    model = learn_sizes(MeasuredSizes.of_heights(rows["height"], CONFIG), rows["frame"], tracklets, RATE)
+    model = learn_heights(rows["height"].astype(float), rows["frame"], tracklets, RATE, CONFIG)
     assert model.spread[0] == pytest.approx(0.8 * CONFIG.body.height_spread**2, rel=0.05)
 
 
 def identities(rows: Rows, constraints: Constraints) -> Ints:
-    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    problem = IdentityProblem.of(rows, sizes, (), RATE, BORDER, CONFIG, constraints)
+    problem = IdentityProblem.of(rows, (), RATE, BORDER, CONFIG, constraints)
     return associate_globally(rows, problem, constraints).identity
 
 

@@ -22,6 +22,7 @@ from stseg.records.tables import APPEARANCE, COLOURS, EVENT, FEATURES, KNOWN_PER
 from stseg.trajectories.final_tracks import CommittedRows, FinalTracks, final_tracks
 
 SPREAD = np.full(3, 25.0)
+NO_PAIRS = np.zeros((0, 2), np.int64)
 PEOPLE = np.array([[6.0, 0, 0], [-6.0, 0, 0], [0, 6.0, -3], [0, -6.0, 3]])
 
 
@@ -38,7 +39,7 @@ def visits_of(
 
 
 def found(visits: Visits, least: float = 0.9) -> dict[int, int]:
-    return {one.visit: one.identity for one in find_returns(visits, SPREAD, least)}
+    return {one.visit: one.identity for one in find_returns(visits, SPREAD, least, NO_PAIRS)}
 
 
 def test_returns_are_known_surely_and_of_two_the_likelier() -> None:
@@ -46,7 +47,7 @@ def test_returns_are_known_surely_and_of_two_the_likelier() -> None:
     assert found(visits_of(*stays)) == {13: 11, 15: 12, 16: 11}
     assert found(visits_of((0, 0, 30), (0, 30, 40), (0, 10, 20))) == {}, "nobody comes back while there"
     assert found(visits_of((0, 0, 30), (0, 31, 40))) == {12: 11}
-    (one,) = find_returns(visits_of((0, 0, 9), (1, 2, 60), (0, 30, 40)), SPREAD, 0.9)
+    (one,) = find_returns(visits_of((0, 0, 9), (1, 2, 60), (0, 30, 40)), SPREAD, 0.9, NO_PAIRS)
     assert (one.frame, one.identity, one.visit, one.absence) == (30, 11, 13, 21) and 0.9 < one.probability < 1
     # Alone the stranger would be taken for the one who left; with the one who left beside, nobody is sure.
     near = PEOPLE.copy()
@@ -64,7 +65,7 @@ def test_the_probability_is_right_in_the_mean() -> None:
         again = int(rng.integers(2))
         stays = ((0, 0, 9), (0 if again else 1, 20, 29))
         seen = visits_of(*stays, precision=1.0, people=people, seed=1000 + trial)
-        for one in find_returns(seen, np.array([4.0]), 0.0):
+        for one in find_returns(seen, np.array([4.0]), 0.0, NO_PAIRS):
             stated.append(one.probability)
             right.append(again)
     share = np.array(stated) > 0.6
@@ -74,7 +75,7 @@ def test_the_probability_is_right_in_the_mean() -> None:
 
 def test_sizes_that_say_nothing_and_people_known_as_two() -> None:
     seen = visits_of((0, 0, 9), (0, 30, 40))
-    (one,) = find_returns(seen, np.zeros(3), 0.0)
+    (one,) = find_returns(seen, np.zeros(3), 0.0, NO_PAIRS)
     assert one.probability == pytest.approx(0.5)
     seen = visits_of((0, 0, 9), (0, 30, 40), (0, 50, 60))
     apart = [(one.visit, one.identity) for one in find_returns(seen, SPREAD, 0.6, np.array([[12, 11]]))]
@@ -122,6 +123,13 @@ def whole(config: Config, constraints: Constraints = NO_CONSTRAINTS) -> FinalTra
 
 def returning(least: float) -> Config:
     return replace(CONFIG, tracking=replace(CONFIG.tracking, return_probability=least))
+
+
+def test_a_run_without_a_track_has_no_returns() -> None:
+    rows = committed(rows_of({1: (straight(0, 0, 0.1, 0), 1.7, range(3))}))
+    born = np.array([(0, b"birth", 1, 0, b"")], EVENT)
+    found = final_tracks(CommittedRows(rows, born, scene()[2][:0]), RATE, BORDER, returning(0.9))
+    assert len(found.trajectory) == 0 and b"dropped" in found.events["kind"]
 
 
 def test_who_comes_back_has_one_id_and_the_events_say_so() -> None:

@@ -13,7 +13,7 @@ from stseg.records.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_kernels import fill_centroids, fill_ground_labels
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_motion import PlacedTracks, motion_field
-from stseg.segmentation.patches import GroundPatches
+from stseg.segmentation.patches import GroundPatches, no_squares
 
 _FAINT = 1e-6
 
@@ -31,6 +31,7 @@ def ground_labels(label: Labels, log_odds: Singles) -> Labels:
 
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
+WHOLE = GroundPatches.of(GRID, ~no_squares(GRID))
 
 
 def test_cells_near_a_person_move_with_them_if_they_do() -> None:
@@ -61,7 +62,7 @@ def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats |
     ground = np.array(standing).reshape(-1, 2)
     log_odds, tracks = np.where(occupied, strength, -3.0).astype(np.float32), np.arange(len(ground)) + 11
     label = np.where(occupied, np.append(tracks, UNASSIGNED)[nearest_person(GRID.ground, ground, 0.4)], 0)
-    return find_blobs(label.astype(np.int32), log_odds, ground, tracks, 0.4, GroundPatches.whole(GRID))
+    return find_blobs(label.astype(np.int32), log_odds, ground, tracks, 0.4, WHOLE)
 
 
 def test_a_person_is_a_blob_and_a_component_by_itself_too() -> None:
@@ -100,7 +101,7 @@ def test_blobs_are_of_tracks_by_most_mass_and_detections() -> None:
     label[1, 3, 3], label[1, 3, 8] = 4, 4
     label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
     nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
-    found = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, GroundPatches.whole(GRID))
+    found = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, WHOLE)
     assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED] and found.person.tolist() == [-1, -1, -1]
     np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
     label = np.zeros(GRID.shape, np.int32)
@@ -108,13 +109,13 @@ def test_blobs_are_of_tracks_by_most_mass_and_detections() -> None:
     for strength, whose in ((1.0, 2), (9.0, 1)):
         log_odds = np.ones(GRID.shape, np.float32)
         log_odds[3] = strength
-        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, GroundPatches.whole(GRID))
+        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, WHOLE)
         assert found.track.tolist() == ([1] if whose == 1 else [2, 1])  # a detection without cells comes last
         assert found.person.tolist() == ([0] if whose == 1 else [-1, 0])
     label = disc((0.45, 0.75)).astype(np.int32) * 3
     for x, person in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
         place, track = np.array([[x, 0.75]]), np.array([3])
-        found = find_blobs(label, label.astype(np.float32), place, track, 0.4, GroundPatches.whole(GRID))
+        found = find_blobs(label, label.astype(np.float32), place, track, 0.4, WHOLE)
         assert found.person.tolist() == person
 
 
@@ -127,7 +128,7 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
     label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([UNASSIGNED, 1, 2, 3], GRID.shape), 0).astype(np.int32)
     log_odds = rng.normal(0, 2, GRID.shape).astype(np.float32)
     log_odds[rng.random(GRID.shape) < 0.1] = np.nan
-    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, GroundPatches.whole(GRID))
+    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, WHOLE)
     number = int((found.extent > 0).sum())
     np.testing.assert_array_equal(found.cells > 0, (label != 0).any(0))
     assert np.unique(found.cells[found.cells > 0]).tolist() == list(range(1, number + 1))

@@ -57,7 +57,8 @@ def commits(weak: float) -> list[Commit]:
 def test_patches_are_enough(weak: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Labels, tracks, energy and undecided cells of the windows are those of the whole ground."""
     cut_out = commits(weak)
-    monkeypatch.setattr(GroundPatches, "of", lambda grid, squares: GroundPatches.whole(grid))  # noqa: ARG005
+    patches_of = GroundPatches.of
+    monkeypatch.setattr(GroundPatches, "of", lambda grid, squares: patches_of(grid, np.ones_like(squares)))
     whole = commits(weak)
     assert sum(len(commit.trajectory) for commit in whole) > 3 * FRAMES
     for one, other in zip(cut_out, whole, strict=True):

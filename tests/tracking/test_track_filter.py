@@ -9,6 +9,7 @@ import reference_core as reference
 from checks import drawn, numbers
 from hypothesis import strategies as st
 from scenes import CONFIG, found, people
+from simulated_people import smoothed_paths
 
 from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
 from stseg.baselines.huang_wang_2012.kalman_filters import corrected_filters, initial, innovations, predicted_filters
@@ -20,7 +21,6 @@ from stseg.records.sizes import Sizes
 from stseg.tracking.filter.motion_model import process_noise, transition
 from stseg.tracking.filter.track_filter import TrackFilter
 from stseg.tracking.filter.track_state import BodyPlace, Measurement, PlacePosterior, TrackState
-from stseg.trajectories.smoother import smoothed_paths
 
 RATE = 8.0
 IDENTITY = CONFIG.tracking
@@ -308,10 +308,10 @@ def lasting_errors(noise: Floats, people: int, frames: int, seconds: float) -> F
 def test_smoothed_places_err_by_as_much_as_claimed() -> None:
     """Errors within a walk are alike, so walks alone are counted as independent."""
     true = walks(NOISE)[0]
-    seconds = np.asarray(np.arange(STEPS) * SECONDS, np.float64)
     noise = np.asarray(np.tile(NOISE, (STEPS, 1, 1)), np.float64)
     measured = true + lasting_errors(NOISE, WALKS, STEPS, SECONDS)
-    paths = [smoothed_paths(seconds, path, noise, [np.arange(STEPS)], MOTION) for path in measured]
+    frames, one = np.arange(STEPS), np.ones(STEPS, np.int64)
+    paths = [smoothed_paths(frames, path, noise, 1 / SECONDS, one) for path in measured]
     pairs = [one for path, real in zip(paths, true, strict=True) for one in zip(path[0] - real, path[1], strict=True)]
     squares = [square(off, covariance) for off, covariance in pairs]
     assert np.mean(squares) == pytest.approx(2.0, abs=4 * 2 / np.sqrt(WALKS))

@@ -7,7 +7,19 @@ import pytest
 from checks import drawn, numbers
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
-from simulated_people import BORDER, CONFIG, RATE, committed, gone, rows_of, runs, straight, swapped, visit
+from simulated_people import (
+    BORDER,
+    CONFIG,
+    RATE,
+    committed,
+    gone,
+    rows_of,
+    runs,
+    smoothed_paths,
+    straight,
+    swapped,
+    visit,
+)
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig
@@ -16,7 +28,7 @@ from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import APPEARANCE, TRAJECTORY
 from stseg.trackers.rows import event_rows
 from stseg.trajectories.final_tracks import CommittedRows, FinalTracks, final_tracks
-from stseg.trajectories.smoother import smooth_places, smoothed_paths
+from stseg.trajectories.smoother import smooth_places
 
 
 def events_of(*events: tuple[int, str, int, int]) -> Rows:
@@ -127,9 +139,8 @@ def test_nobody_dropped_tracks_and_a_single_measurement() -> None:
     assert found.identity.tolist() == np.where(rows["id"] == 5, 5, 0).tolist()
     assert story(found.events) == [(10, b"dropped", 7, 0)] and set(found.trajectory["id"].tolist()) == {5}
     ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
-    for same in zip(
-        smoothed_paths(np.array([3.0]), ground, noise, [np.arange(1)], MOTION), (ground, noise), strict=True
-    ):
+    one = np.ones(1, np.int64)
+    for same in zip(smoothed_paths(one, ground, noise, SMOOTHER_RATE, one), (ground, noise), strict=True):
         np.testing.assert_array_equal(*same)
 
 
@@ -172,7 +183,7 @@ def measured(draw: st.DrawFn) -> tuple[Ints, Floats, Floats]:
 @drawn(100, measured())
 def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = path
-    places, spread = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, [np.arange(len(frames))], MOTION)
+    places, spread = smoothed_paths(frames, ground, noise, SMOOTHER_RATE, np.ones_like(frames))
     expected, covariance = conditioned(frames / SMOOTHER_RATE, ground, noise)
     np.testing.assert_allclose(places, expected, atol=1e-9, rtol=0)
     np.testing.assert_allclose(spread, covariance, atol=1e-9, rtol=0)
@@ -183,7 +194,7 @@ def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Float
 def test_covariances_without_full_rank_are_smoothed(yy: float, xy: float) -> None:
     """Rows that say their place exactly, or along one line, or that float32 has rounded."""
     ground, noise = np.array([[0.1 * k, 0.2] for k in range(4)]), np.tile([[yy, xy], [xy, yy]], (4, 1, 1))
-    places, spread = smoothed_paths(np.arange(4) / SMOOTHER_RATE, ground, noise, [np.arange(4)], MOTION)
+    places, spread = smoothed_paths(np.arange(4), ground, noise, SMOOTHER_RATE, np.ones(4, np.int64))
     assert np.isfinite(places).all() and np.isfinite(spread).all()
     np.testing.assert_allclose(places, ground, atol=0.1)
 
@@ -219,10 +230,10 @@ def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
 @drawn(100, measured(), measured())
 def test_paths_at_once_are_as_alone(one: tuple[Ints, Floats, Floats], other: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = (np.concatenate(pair) for pair in zip(one, other, strict=True))
-    tracks = np.split(np.arange(len(frames)), [len(one[0])])
+    track = np.repeat([1, 2], [len(one[0]), len(other[0])])
     with patch("stseg.trajectories.smoother._ROWS_AT_ONCE", 5):
-        both = smoothed_paths(frames / SMOOTHER_RATE, ground, noise, tracks, MOTION)
-    for rows in tracks:
-        alone = smoothed_paths(frames[rows] / SMOOTHER_RATE, ground[rows], noise[rows], [np.arange(len(rows))], MOTION)
+        both = smoothed_paths(frames, ground, noise, SMOOTHER_RATE, track)
+    for rows in (track == 1, track == 2):
+        alone = smoothed_paths(frames[rows], ground[rows], noise[rows], SMOOTHER_RATE, track[rows])
         np.testing.assert_array_equal(both[0][rows], alone[0])
         np.testing.assert_array_equal(both[1][rows], alone[1])

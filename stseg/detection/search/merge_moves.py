@@ -14,6 +14,7 @@ from stseg.bodies.views import PixelView
 from stseg.detection.search.local_search import SCORE_TOLERANCE
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.refined_people import refined_members
+from stseg.geometry.distances import distances
 from stseg.records.candidates import Candidates
 
 _MERGE_DISTANCE = 0.6
@@ -61,8 +62,7 @@ def _centred(estimate: MapEstimate, is_close: Flags, separate: Ints) -> MapEstim
 def _close_pairs(estimate: MapEstimate) -> Flags:
     """Pairs of members that may be one body, bool (n, n)."""
     ground = estimate.pool.ground[estimate.members]
-    distance = np.hypot(*(ground[:, None] - ground[None]).transpose(2, 0, 1))
-    return np.asarray((distance < _MERGE_DISTANCE) & ~np.eye(len(ground), dtype=bool))
+    return np.asarray((distances(ground, ground) < _MERGE_DISTANCE) & ~np.eye(len(ground), dtype=bool))
 
 
 def _separate_members(estimate: MapEstimate, is_close: Flags) -> Ints:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Bytes, Labels, Rows, Singles
+from stseg.arrays import Bytes, Labels, Rows, Singles, ground_of
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
@@ -125,5 +125,5 @@ def _volume(job: Job, step: CommittedFrames, k: int) -> tuple[Singles, Labels]:
     if job.volume == "tracks":
         rows, ground = step.commit.trajectory, job.recording.rig.grid.ground
         here = rows[rows["frame"] == scene.frame]
-        log_odds[:, nearest_person(ground, np.column_stack([here["x"], here["y"]]), _VOLUME_RADIUS) < 0] = np.nan
+        log_odds[:, nearest_person(ground, ground_of(here), _VOLUME_RADIUS) < 0] = np.nan
     return log_odds, label

@@ -20,7 +20,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.identities.evidence.appearance_axes import WRONG, Axes, discriminant_axes, independent_frames
-from stseg.identities.evidence.size_model import SizeModel, SizePrior, measured_tracklets
+from stseg.identities.evidence.size_model import SizeModel, measured_tracklets, prior_errors
 from stseg.noise.lasting_error import constant_errors
 from stseg.records.tables import APPEARANCE
 
@@ -30,8 +30,6 @@ _LEAST_PEOPLE, _MOST_PEOPLE = 3, 1000
 """Least and most people."""
 _PEOPLE_BLOCK = 50
 """Successive people that are taken or left out together: tracklets are compared with people of the same time."""
-_UNIT_PRIOR = SizePrior(1.0, 1.0)
-"""Prior of an axis of unit noise."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +179,7 @@ def _learned(
     number, along = len(axes.spread), axes.of(value)
     # Where all pairs are far apart, they do not say how long errors last, but differences within tracklets do.
     measured = measured_tracklets(value[:, 0], tracklets)
-    errors = constant_errors(np.ascontiguousarray(along.T), frame, measured, _UNIT_PRIOR.errors(number), frame_rate)
+    errors = constant_errors(np.ascontiguousarray(along.T), frame, measured, prior_errors(1.0, number), frame_rate)
     row_variance = np.maximum(lasting, errors.row_variance(frame_rate))
     # An observation may be of a person in front: under a share of such errors none says more than this against one.
     most_against = np.full(number, -np.log(WRONG) / max(number, 1))

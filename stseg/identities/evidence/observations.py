@@ -60,7 +60,7 @@ class Observations:
         return np.argsort(self.order)
 
     @cached_property
-    def _frame(self) -> Ints:
+    def frame(self) -> Ints:
         """int64 (n,): index of the frame of each observation."""
         return np.repeat(np.arange(len(self.seconds)), np.diff(self.start))
 
@@ -69,7 +69,7 @@ class Observations:
 
         The size evidence of those that are left out, int64 (m,), counts for chosen ones that stand in for each, (m,).
         """
-        frames, start = np.unique(self._frame[chosen], return_index=True)
+        frames, start = np.unique(self.frame[chosen], return_index=True)
         place = np.full(len(self.order) + 1, -1)  # the last is that of no observation
         place[chosen] = np.arange(len(chosen))
         one, previous = self.rows, place[self.rows.previous[chosen]]

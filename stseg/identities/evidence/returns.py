@@ -24,8 +24,6 @@ from stseg.identities.evidence.appearance_model import row_means
 from stseg.identities.evidence.size_model import evidence
 from stseg.records.tables import KNOWN_PERSON
 
-NO_PAIRS: Ints = np.zeros((0, 2), np.int64)
-"""Default of `different`."""
 _EVIDENCE_LIMIT = 500.0
 """Most evidence that is told apart from certainty, nats."""
 
@@ -75,7 +73,7 @@ class _People:
         self.person[visit] = person
 
 
-def find_returns(visits: Visits, spread: Floats, least: float, different: Ints = NO_PAIRS) -> list[Return]:
+def find_returns(visits: Visits, spread: Floats, least: float, different: Ints) -> list[Return]:
     """Visits, given in the order of time, of people who were there before.
 
     `spread` float64 (size,) is the variance of each size among people, `least` the least probability of a return, and
@@ -168,7 +166,7 @@ def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: F
     person happened to be. The variance of the latter is learned from the halves of every visit.
 
     Of each row are `identity` int64 (n,), 0 for none, `frame` int64 (n,), and `precision` and `information` float64 (n,
-    size), see `stseg.identities.evidence.observations.Observations`.
+    size), see `stseg.identities.evidence.observations.ObservedRows`.
     """
     order = np.lexsort((frame, identity))
     order = order[identity[order] > 0]
@@ -220,17 +218,17 @@ def known_people(committed: Rows, appearance: Rows) -> Rows:
     owner = np.where(committed["id"] > 0, np.searchsorted(people, committed["id"]), -1)
     table = np.zeros(len(people), KNOWN_PERSON)
     table["id"] = people
-    table["height"], table["height_count"] = _means(committed["height"][:, None], owner, len(people), 0)
+    height, table["height_count"] = _means(committed["height"][:, None], owner, len(people))
+    table["height"] = height[:, 0]
     colours = row_means(committed, (appearance,), "colours")
     table["colours"], table["appearance_count"] = _means(colours, owner, len(people))
     return table
 
 
-def _means(value: AnyArray, owner: Ints, people: int, column: int | None = None) -> tuple[Floats, Ints]:
+def _means(value: AnyArray, owner: Ints, people: int) -> tuple[Floats, Ints]:
     """Mean of the finite rows of value (n, k) of each person, float64 (people, k), nan without, and their numbers."""
     rows = np.flatnonzero(np.isfinite(value).all(axis=1) & (owner >= 0))
     number = np.bincount(owner[rows], minlength=people)
     sums = np.zeros((people, value.shape[1]))
     np.add.at(sums, owner[rows], value[rows])
-    mean = np.where(number[:, None] > 0, sums / np.maximum(number, 1)[:, None], np.nan)
-    return (mean if column is None else mean[:, column]), number
+    return np.where(number[:, None] > 0, sums / np.maximum(number, 1)[:, None], np.nan), number

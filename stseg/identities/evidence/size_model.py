@@ -28,38 +28,10 @@ _FARTHEST = 4.0
 """Deviation of a row's size from which it is no size of the person, standard deviations: those who sit or bend."""
 
 
-@dataclass(frozen=True)
-class SizePrior:
-    """Errors and spread of a size before the recording."""
-
-    noise: float
-    spread: float
-    """Standard deviations of a frame's error, all of which lasts, and among people."""
-
-    def errors(self, sizes: int = 1) -> LastingError:
-        """The errors of some sizes of this prior."""
-        one = np.ones(sizes)
-        return LastingError(0.0 * one, self.noise**2 * one, _PRIOR_TIME * one)
-
-
-@dataclass(frozen=True)
-class MeasuredSizes:
-    """Sizes of the person in each row of a trajectory."""
-
-    value: Floats
-    """float64 (n, size): nan where unmeasured."""
-    priors: list[SizePrior]
-    """One for each size."""
-
-    @classmethod
-    def of_heights(cls, height: Floats, config: Config) -> MeasuredSizes:
-        """Heights (n,) alone, metres."""
-        prior = SizePrior(config.tracking.height_noise, config.body.height_spread)
-        return cls(np.asarray(height, float)[:, None], [prior])
-
-    def with_unmeasured(self, number: int) -> MeasuredSizes:
-        """The sizes with some rows more, of which nothing is known."""
-        return MeasuredSizes(np.pad(self.value, ((0, number), (0, 0)), constant_values=np.nan), self.priors)
+def prior_errors(noise: float, sizes: int = 1) -> LastingError:
+    """Errors of some sizes before the recording: all of a frame's error lasts, of a standard deviation."""
+    one = np.ones(sizes)
+    return LastingError(0.0 * one, noise**2 * one, _PRIOR_TIME * one)
 
 
 @dataclass(frozen=True)
@@ -97,24 +69,19 @@ class SizeModel:
         return precision, information
 
 
-def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], frame_rate: float) -> SizeModel:
-    """Statistics of the sizes of a recording.
+def learn_heights(
+    height: Floats, frame: Ints, tracklets: Sequence[Ints], frame_rate: float, config: Config
+) -> SizeModel:
+    """Statistics of heights, metres, nan where unmeasured: `height` float64 (n,) and `frame` int64 (n,) of each row.
 
-    Parameters
-    ----------
-    sizes
-        Of each row.
-    frame : int64 (n,)
-        Frame of each row.
-    tracklets
-        Rows of each isolated tracklet, in the order of time.
-    frame_rate
-        Frames per second.
+    `tracklets` are rows of each isolated tracklet, in the order of time, `frame_rate` is in frames per second.
     """
-    columns = zip(sizes.value.T, sizes.priors, strict=True)
-    learned = [_learn(column, frame, tracklets, prior, frame_rate) for column, prior in columns]
-    mean, variance, row_variance, spread = np.array(learned, np.float64).reshape(-1, 4).T
-    return SizeModel(mean, variance, row_variance, spread, np.full(len(learned), np.inf))
+    measured = measured_tracklets(height, tracklets)
+    mean = float(np.mean(height[np.concatenate(measured)])) if measured else 0.0
+    errors = constant_errors(height[None], frame, measured, prior_errors(config.tracking.height_noise), frame_rate)
+    row_variance = errors.row_variance(frame_rate) + _POSTURE.row_variance(frame_rate)
+    spread = _spread(height - mean, measured, config.body.height_spread)
+    return SizeModel(np.array([mean]), errors.variance, row_variance, np.array([spread]), np.full(1, np.inf))
 
 
 def evidence(precision: Floats, information: Floats, spread: Floats) -> Floats:
@@ -129,21 +96,11 @@ def measured_tracklets(size: Floats, tracklets: Sequence[Ints]) -> list[Ints]:
     return [rows for rows in measured if len(rows) >= _LEAST_FRAMES]
 
 
-def _learn(
-    size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
-) -> tuple[float, float, float, float]:
-    measured = measured_tracklets(size, tracklets)
-    mean = float(np.mean(size[np.concatenate(measured)])) if measured else 0.0
-    errors = constant_errors(size[None], frame, measured, prior.errors(), frame_rate)
-    row_variance = float(errors.row_variance(frame_rate)[0] + _POSTURE.row_variance(frame_rate))
-    return mean, float(errors.variance[0]), row_variance, _spread(size - mean, measured, prior)
-
-
-def _spread(deviation: Floats, tracklets: Sequence[Ints], prior: SizePrior) -> float:
+def _spread(deviation: Floats, tracklets: Sequence[Ints], prior: float) -> float:
     """Variance among people: the covariance of the first and the last third of each tracklet.
 
     Errors of the two are independent unless they last as long, so no noise has to be subtracted.
     """
     thirds = [(rows, max(len(rows) // 3, 1)) for rows in tracklets]
     total = sum(float(deviation[rows[:third]].mean() * deviation[rows[-third:]].mean()) for rows, third in thirds)
-    return max((total + _PRIOR_PEOPLE * prior.spread**2) / (len(tracklets) + _PRIOR_PEOPLE), 0.0)
+    return max((total + _PRIOR_PEOPLE * prior**2) / (len(tracklets) + _PRIOR_PEOPLE), 0.0)

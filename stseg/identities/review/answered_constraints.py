@@ -15,10 +15,8 @@ from stseg.arrays import Flags, Ints, Rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.search.constraints import Constraints
 from stseg.records.tables import ANSWER
-from stseg.tracking.row_groups import near_rows
+from stseg.tracking.row_groups import EXCHANGE_DISTANCE, near_rows, rows_of_tracks
 
-_SEPARATION_DISTANCE = 0.8
-"""Distance from which on two people stand apart, metres."""
 _SEARCH_TIME = 5.0
 """Longest time before and after the frame of an answer in which rows are looked for, seconds."""
 _SOLITARY_TIME = 1.0
@@ -94,10 +92,11 @@ class RowsOfTracks:
 
     def __init__(self, rows: Rows, frame_rate: float) -> None:
         self.rows, self.frame_rate, self.reach = rows, frame_rate, _SEARCH_TIME * frame_rate
-        self.of = _divided(rows["id"], rows["frame"])
+        order = np.argsort(rows["frame"], kind="stable")
+        self.of = {int(rows["id"][index[0]]): index for index in (order[k] for k in rows_of_tracks(rows["id"][order]))}
         self.frames = {track: rows["frame"][index] for track, index in self.of.items()}
         self.is_solitary = np.ones(len(rows), bool)
-        self.is_solitary[near_rows(rows, _SEPARATION_DISTANCE)[0]] = False
+        self.is_solitary[near_rows(rows, EXCHANGE_DISTANCE)[0]] = False
 
     def pairs(self, answer: Answer) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
         """Pairs of rows that are one person by an answer, and pairs that are two."""
@@ -159,14 +158,7 @@ class RowsOfTracks:
         of_other, frame = self.of[other], self.rows["frame"]
         at = of_other[np.searchsorted(self.frames[other], frame[rows]).clip(max=len(of_other) - 1)]
         x, y = (self.rows[name][at] - self.rows[name][rows] for name in ("x", "y"))
-        return np.asarray((frame[at] != frame[rows]) | (np.hypot(x, y) >= _SEPARATION_DISTANCE))
-
-
-def _divided(key: Ints, order: Ints) -> dict[int, Ints]:
-    """Rows of each key, in an order."""
-    rows = np.lexsort((order, key))
-    keys, first = np.unique(key[rows], return_index=True)
-    return dict(zip(keys.tolist(), np.split(rows, first[1:]) if len(keys) else [], strict=True))
+        return np.asarray((frame[at] != frame[rows]) | (np.hypot(x, y) >= EXCHANGE_DISTANCE))
 
 
 def _known(pairs: list[tuple[int | None, int | None]]) -> list[tuple[int, int]]:

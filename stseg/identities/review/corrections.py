@@ -54,7 +54,7 @@ class Corrections:
         key = self.track * span + np.clip(self.start, 0, None)
         index = np.searchsorted(key, track * span + frame, "right") - 1
         in_piece = (index >= 0) & (self.track[index] == track) if len(key) else np.zeros(len(track), bool)
-        return np.where(in_piece, self.identity[index] if len(key) else 0, np.where(track == 0, 0, track))
+        return np.where(in_piece, self.identity[index] if len(key) else 0, track)
 
 
 def solve_corrections(tracks: Rows, answers: Sequence[Answer]) -> Corrections:

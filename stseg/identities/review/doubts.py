@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
-from stseg.arrays import Floats, Rows, columns, some_columns
+from stseg.arrays import Floats, Rows, by_track, columns, some_columns
 from stseg.records.track_heights import median_measured
 
 _ENCOUNTER_DISTANCE = 0.7
@@ -79,9 +79,7 @@ def identity_doubts(trajectory: Rows, frame_rate: float) -> list[Doubt]:
 
 def _by_track(trajectory: Rows) -> dict[int, Rows]:
     """Rows of each track in the order of time, by rising id: what is compared of them."""
-    rows = some_columns(trajectory, _COMPARED, np.lexsort((trajectory["frame"], trajectory["id"])))
-    parts = np.split(rows, np.flatnonzero(np.diff(rows["id"])) + 1) if len(rows) else []
-    return {int(part["id"][0]): part for part in parts}
+    return {int(part["id"][0]): part for part in by_track(some_columns(trajectory, _COMPARED))}
 
 
 def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:

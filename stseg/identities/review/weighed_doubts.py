@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit
 
 from stseg.arrays import Ints, Rows
 from stseg.identities.association import IdentityProblem
@@ -64,7 +63,7 @@ def doubt_events(trajectory: Rows, rows: Rows, problem: IdentityProblem, constra
 
 
 def _event(doubt: Doubt) -> tuple[int, bytes, int, int, bytes]:
-    chance = f"{100 * expit(-doubt.margin):.0f} %"
+    chance = f"{100 * doubt.chance:.0f} %"
     words = {
         "encounter": f"exchanged in this encounter with a probability of {chance}",
         "birth": f"with a probability of {chance} this track is from here on another person, and {doubt.other} is it",

@@ -125,10 +125,9 @@ def search_identities(
 
     Constraints are pairs of observations. All are obeyed unless they contradict each other.
     """
-    frame = np.repeat(np.arange(len(observations.seconds)), np.diff(observations.start))
+    frame, rows = observations.frame, observations.rows
     people = ConstrainedPeople.of(constraints, frame)
     # Frames with constraints lose their certain rows: a constraint may overrule them.
-    rows = observations.rows
     rows = rows._replace(certain=rows.certain & ~np.isin(frame, people.decided(frame)))
     slots = int(np.diff(observations.start).max(initial=0)) + _SPARE + people.most_open()
     most = limits.hypotheses
