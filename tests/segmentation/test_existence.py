@@ -66,7 +66,7 @@ def test_rejected_candidates_alone_are_nobody() -> None:
 
 
 def test_only_the_last_frame_of_a_window_has_free_deaths() -> None:
-    """A glimpse in the middle pays for its birth and its death, though nothing is seen later; in the last it may stay."""
+    """A glimpse in the middle pays for birth and death, though nothing is seen later; in the last frame it may stay."""
     glimpse = candidates((3, 0.0, 0.0, 12.0, 1))
     assert not decide(glimpse).real.any() and decide(replace(glimpse, frames=4)).real.all()
 
