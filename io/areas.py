@@ -27,10 +27,15 @@ def _rings(path: Path, name: str, polygons: Any) -> Iterator[Floats]:
     for polygon in _listed(path, name, polygons):
         for ring in _listed(path, name, polygon):
             points = _points(path, name, ring, 3)
-            yield points[:-1] if (points[0] == points[-1]).all() else points
             corners += len(points)
+            points = points[:-1] if (points[0] == points[-1]).all() else points
+            if len(points) < 3:
+                raise FormatError(path, name, f"{len(points)} points", "3 or more for each ring")
             if corners > limits.CORNERS:
                 raise FormatError(path, name, f"{corners} corners or more", f"at most {limits.CORNERS}")
+            yield points
+    if not corners:
+        raise FormatError(path, name, "no ring", "lists of [x, y] in metres")
 
 
 def read_lines(path: Path) -> list[Named]:

@@ -124,7 +124,7 @@ class Table:
         """Width and height of an image, pixels."""
         size = self.numbers(name, 2)
         if (size != size.round()).any() or (size < 1).any() or size.max() > limits.SIDE or size.prod() > limits.PIXELS:
-            expected = f"width and height in whole pixels, at most {limits.SIDE} each and {limits.PIXELS:.0e} pixels"
+            expected = f"width and height in whole pixels, at most {limits.SIDE} each and {limits.PIXELS} pixels"
             raise self.error(name, size.tolist(), expected)
         return int(size[0]), int(size[1])
 

@@ -54,7 +54,7 @@ def committed(rows: Rows) -> Rows:
     return found
 
 
-def smoothed_paths(frame: Ints, ground: Floats, noise: Floats, rate: float, track: Ints) -> tuple[Floats, Floats]:
+def smoothed(frame: Ints, ground: Floats, noise: Floats, rate: float, track: Ints) -> tuple[Floats, Floats]:
     """Smoothed places (n, 2) and covariances (n, 2, 2) of measured ones, each of a frame and a track."""
     rows = np.zeros(len(frame), TRAJECTORY)
     rows["frame"], rows["id"], (rows["raw_x"], rows["raw_y"]) = frame, track, ground.T

@@ -110,7 +110,7 @@ def _read_tsai(file: Path) -> ForeignCamera:
     if min(width, height, dpx, dpy, focal, sx) <= 0:
         raise FormatError(file, "Geometry, Intrinsic", "a length that is not above 0", "lengths above 0")
     if width % 1 or height % 1 or max(width, height) > limits.SIDE or width * height > limits.PIXELS:
-        expected = f"whole pixels, at most {limits.PIXELS:.0e}"
+        expected = f"whole pixels, at most {limits.PIXELS}"
         raise FormatError(file, "Geometry", f"{width:g} x {height:g} pixels", expected)
     matrix = np.array([[focal * sx / dpx, 0, cx], [0, focal / dpy, cy], [0, 0, 1]])
     corners = (np.array([[0, 0], [width, 0], [0, height], [width, height]]) - (cx, cy)) / (matrix[0, 0], matrix[1, 1])

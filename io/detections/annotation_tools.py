@@ -27,7 +27,7 @@ from stseg.io.untrusted.values import abbreviated
 
 def read_cvat(request: Request) -> Detections:
     """Boxes and polygons of CVAT's XML 1.1, of a video or of images; shapes outside the image are left out."""
-    root = parse_xml(request.path, "CVAT's XML: <annotations>")
+    root = parse_xml(request.path, "CVAT's XML: <annotations>", limits.DETECTIONS_FILE)
     if root.tag != "annotations":
         raise FormatError(request.path, "", f"<{root.tag}>", "CVAT's XML: <annotations>")
     found, images = DetectionList(request.path), root.findall("image")
@@ -92,11 +92,11 @@ def read_label_studio(request: Request, data: Any) -> Detections:
     if videos and len(data) > 1:
         raise FormatError(request.path, "", f"{len(data)} tasks", "one camera: its video alone, or a file for each")
     if videos:
-        lengths = list[int]()
+        lengths, between = list[int](), 0
         for index, one in enumerate(videos):
             place = f"result {index}"
             value = required_value(request.path, place, one, "value")
-            _add_video_track(request, found, place, value)
+            between += _add_video_track(request, found, place, value, limits.INTERPOLATED - between)
             lengths.append(int(number(request.path, place, "framesCount", value.get("framesCount", 0))))
         return found.done(max(lengths) or None)
     named = [optional_value(request.path, f"task {k}", task, "data", dict) for k, task in enumerate(data)]
@@ -144,8 +144,11 @@ _PERCENT = ("x", "y", "width", "height")
 _OTHER_AREAS = ("mask", "ellipse", "cuboid", "skeleton", "circle", "brushlabels", "ellipselabels")
 
 
-def _add_video_track(request: Request, found: DetectionList, place: str, value: Any) -> None:
-    """One video rectangle: frames count from 1 there; between two keyframes it is enabled in, it moves straight."""
+def _add_video_track(request: Request, found: DetectionList, place: str, value: Any, most: int) -> int:
+    """One video rectangle: frames count from 1 there; between two keyframes it is enabled in, it moves straight.
+
+    The number of frames between its keyframes, at most `most`.
+    """
     steps = required_tables(request.path, place, value, "sequence")
     label, size = _first(request.path, place, value, "labels"), np.array(request.size * 2)
     keys = ("frame", *_PERCENT)
@@ -155,7 +158,8 @@ def _add_video_track(request: Request, found: DetectionList, place: str, value: 
             for step in steps
         ]
     ).reshape(-1, 5)
-    if (np.diff(table[:, 0]) <= 0).any() or table[-1:, 0].sum() - table[:1, 0].sum() > limits.INTERPOLATED - len(found):
+    between = np.diff(table[:, 0]) - 1
+    if (between < 0).any() or between.sum() > most:
         expected = f"rising frames, and at most {limits.INTERPOLATED} boxes between all keyframes"
         raise FormatError(request.path, place, "keyframes that do not rise, or are far apart", expected)
     on = [bool(step.get("enabled", True)) for step in steps]
@@ -165,6 +169,7 @@ def _add_video_track(request: Request, found: DetectionList, place: str, value: 
         boxes = np.stack([np.interp(frames, table[:, 0], column) / 100 for column in table[:, 1:].T], -1) * size
         for frame, box in zip(frames.tolist(), boxes.tolist(), strict=True):
             found.add(place, int(frame) - 1, box, label=label)
+    return int(between.sum())
 
 
 def is_via(data: Any) -> bool:

@@ -1,7 +1,7 @@
 """Masks of detections: polygons, and run lengths as COCO encodes them.
 
 Source of the compressed form: the COCO API (cocodataset/cocoapi, maskApi.c): counts of alternating zeros and ones down
-the columns, from the third on as differences to the count two before, six bits a character.
+the columns, from the fourth on as differences to the count two before, six bits a character.
 """
 
 from collections.abc import Sequence

@@ -96,6 +96,8 @@ def _length(source: Source, found: Detections, kept: Detections) -> int:
     """Number of frames: the rig's, the source's, or up to the last frame with a detection."""
     first, here = source.first_frame, "detections there"
     length = source.frames or (found.frames - first if found.frames is not None else None)
+    if length is not None and length < 1:
+        raise FormatError(source.path, "first_frame", str(first), f"a frame below {found.frames}")
     if length is None and not len(kept):
         classes = ", ".join(f"{name} ({count})" for name, count in found.classes().items())
         wanted = f"no detections of {', '.join(source.classes)}" if source.classes else "no detections"

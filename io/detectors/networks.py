@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Singles
 from stseg.errors import FormatError, SourceError
-from stseg.io.detectors.onnx_header import OnnxHeader, parse_header
+from stseg.io.detectors.onnx_header import parse_header
 from stseg.io.extras import load_extra
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_bytes, reading
@@ -83,7 +83,7 @@ class Network:
             raise FormatError(self.path, "", found[: limits.PATH], "one colour picture, [1, 3, height, width]")
         height, width = (axis or side for axis, side in zip(shape[2:], self._trained_size(sides), strict=True))
         if height * width > limits.PIXELS:
-            raise FormatError(self.path, "", f"an input of {width}x{height}", f"at most {limits.PIXELS:.0e} pixels")
+            raise FormatError(self.path, "", f"an input of {width}x{height}", f"at most {limits.PIXELS} pixels")
         return width, height
 
     def _trained_size(self, default: tuple[int, int]) -> tuple[int, int]:
@@ -129,11 +129,6 @@ def runtime(by_opencv: bool | None = None) -> str:
 
 def _by_opencv() -> bool:
     return find_spec("onnxruntime") is None
-
-
-def describe(header: OnnxHeader) -> str:
-    """The outputs of a model in words."""
-    return ", ".join(map(str, header.outputs))
 
 
 def _read(path: Path) -> bytes:

@@ -10,10 +10,10 @@ import numpy as np
 from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
 from stseg.errors import FormatError
 from stseg.io.detectors.layouts import LAYOUTS, ScoredBoxes, recognise
-from stseg.io.detectors.networks import Network, describe
+from stseg.io.detectors.networks import Network
 from stseg.io.detectors.picture_fit import fit_picture
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import one_of
+from stseg.io.untrusted.values import one_of, parse_whole
 
 PERSON = "person"
 _LEAST_SCORE = 0.25
@@ -53,16 +53,11 @@ class OnnxDetector:
         outputs = self._network(_as_input(grey, True, 1.0))
         layout = recognise(outputs, self._network.size)
         if layout is None:
-            found = f"the outputs {describe(self._network.header)}"[: limits.PATH]
+            found = f"the outputs {', '.join(map(str, self._network.header.outputs))}"[: limits.PATH]
             expected = "; ".join(f"{one.name} {one.shapes}" for one in LAYOUTS)
             raise FormatError(path, "", found, f"those of a known detector: {expected}")
         self.layout = layout
         self._wanted = _class_numbers(path, classes, class_names(self._network.header.metadata))
-
-    @property
-    def runtime(self) -> str:
-        """The library that runs the network, and its version."""
-        return self._network.runtime
 
     def detect(self, picture: Bytes) -> Boxes:
         """Boxes in a picture, uint8 (v, u, 3) in the order blue, green, red; the best score first."""
@@ -106,7 +101,7 @@ def _class_numbers(path: Path, classes: Sequence[str], names: Mapping[int, str])
     by_name = {name.lower(): number for number, name in names.items()} or {PERSON: 0}
     found = []
     for name in classes:
-        number = int(name) if name.isdecimal() else by_name.get(name.lower())
+        number = parse_whole(name, 0, limits.FRAMES) if name.isdecimal() else by_name.get(name.lower())
         if number is None or (names and number not in names):
             expected = one_of(name, [*by_name]) + (", or its number" if not names else "")
             raise FormatError(path, "classes", repr(name), expected)

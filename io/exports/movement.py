@@ -14,7 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Floats, Rows, ground_of
 from stseg.io.extras import load_extra
 from stseg.io.outputs.whole_files import MARK
 from stseg.io.runfile import layout
@@ -41,7 +41,7 @@ def write_movement(path: Path, run: Run) -> None:
         position = _variable(file, "position", ("time", "space", "keypoint", "individual"), "metres on the ground")
         confidence = _variable(file, "confidence", ("time", "keypoint", "individual"), "probability of a person")
         for individual, rows in rows_by_track(run, run.trajectory):
-            span, ground = _filled(run, rows, np.stack([rows["x"], rows["y"]], -1))
+            span, ground = _filled(run, rows, ground_of(rows))
             position[span, :, 0, individual] = ground
             confidence[span, 0, individual] = _filled(run, rows, _probability(rows))[1]
 
@@ -156,7 +156,7 @@ def headings(table: Rows) -> Floats:
     People who stand still, or exist for one frame, face along x: JuPedSim requires a direction.
     """
     order = np.lexsort((table["frame"], table["id"]))
-    place, track = np.stack([table["x"], table["y"]], -1)[order], table["id"][order]
+    place, track = ground_of(table)[order], table["id"][order]
     begins = np.append(True, np.diff(track) != 0)[: len(track)]
     rows = np.arange(len(track))
     way = place[np.where(np.roll(begins, -1), rows, rows + 1)] - place[np.where(begins, rows, rows - 1)]

@@ -136,15 +136,21 @@ class _NoRedirects(urllib.request.HTTPRedirectHandler):
         """None of them."""
 
 
+def _without_login(address: SplitResult) -> tuple[str, dict[str, str]]:
+    """An address without its login, and the header that carries that."""
+    url = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
+    if address.username is None:
+        return url, {}
+    login = f"{unquote(address.username)}:{unquote(address.password or '')}"
+    return url, {"Authorization": f"Basic {b64encode(login.encode()).decode()}"}
+
+
 class HttpReceiver:
     """Each message is the body of one POST request, of type application/x-ndjson."""
 
     def __init__(self, address: SplitResult) -> None:
-        self._url = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
-        self._headers = {"Content-Type": "application/x-ndjson"}
-        if address.username is not None:
-            login = f"{unquote(address.username)}:{unquote(address.password or '')}"
-            self._headers["Authorization"] = f"Basic {b64encode(login.encode()).decode()}"
+        self._url, login = _without_login(address)
+        self._headers = {"Content-Type": "application/x-ndjson"} | login
         self._opener = urllib.request.build_opener(_NoRedirects)
 
     def send(self, message: bytes) -> None:
@@ -168,7 +174,7 @@ class MqttReceiver:
         self._address, self._topic = address, address.path.lstrip("/")
         self._client: Any = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
         if address.username is not None:
-            self._client.username_pw_set(address.username, address.password)
+            self._client.username_pw_set(unquote(address.username), unquote(address.password or ""))
         self._is_begun = False
 
     def send(self, message: bytes) -> None:
@@ -198,7 +204,7 @@ class WebSocketReceiver:
     def __init__(self, address: SplitResult) -> None:
         self._library = load_extra("websockets.sync.client", "websocket")
         self._broken: type[Exception] = load_extra("websockets.exceptions", "websocket").WebSocketException
-        self._url = address.geturl()
+        self._url, self._login = _without_login(address)
         self._connection: Any = None
 
     def send(self, message: bytes) -> None:
@@ -221,7 +227,8 @@ class WebSocketReceiver:
             self._connection = None
 
     def _connect(self) -> Any:
-        connection = self._library.connect(self._url, open_timeout=_TIMEOUT, close_timeout=_TIMEOUT)
+        waits = {"open_timeout": _TIMEOUT, "close_timeout": _TIMEOUT}
+        connection = self._library.connect(self._url, additional_headers=self._login, **waits)
         Thread(target=self._discard, args=(connection,), name="discarded messages", daemon=True).start()
         return connection
 

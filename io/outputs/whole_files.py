@@ -147,7 +147,7 @@ def publish_part(part: Path, path: Path, overwrite: bool) -> None:
             raise
         except OSError:  # a file system without links
             if os.path.lexists(path):
-                raise FileExistsError(17, "a file that has appeared meanwhile") from None
+                raise FileExistsError(errno.EEXIST, "a file that has appeared meanwhile") from None
             part.replace(path)
         else:
             part.unlink()

@@ -15,7 +15,7 @@ from PIL import Image
 from stseg.arrays import AnyArray, Bytes, Observation
 from stseg.errors import SourceError
 from stseg.io.recording.recording import SourceKind
-from stseg.io.untrusted.bounded_files import read_bytes
+from stseg.io.untrusted.bounded_files import read_bytes, reading
 
 # Video codecs leave a trace of colour on grey; real colour pictures have far more.
 _GREY_SPREAD = 32
@@ -33,12 +33,8 @@ def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) 
     height that it must have, pixels, `key` the camera and frame, for errors. SourceError where the file cannot be
     read or decoded, or is not of that kind or size.
     """
-    try:
+    with reading(path, "an image", SourceError, key):
         data = read_bytes(path, _MOST_BYTES)
-    except OSError as error:
-        raise SourceError(path, key, error.strerror or error, "an image") from error
-    except ValueError as error:
-        raise SourceError(path, key, error, "an image") from error
     declared = declared_size(data)
     if declared is not None and sorted(declared) != sorted(size):  # Exif may turn it
         found, expected = f"an image of {declared[0]}x{declared[1]}", f"{size[0]}x{size[1]}, the size of the camera"
@@ -64,10 +60,8 @@ def declared_size(data: bytes) -> tuple[int, int] | None:
 
 def read_colour(path: Path) -> Bytes:
     """One image file in colour, uint8 (v, u, 3); raises as `read_picture` does."""
-    try:
+    with reading(path, "an image", SourceError):
         size = declared_size(read_bytes(path, _MOST_BYTES))
-    except (OSError, ValueError) as error:
-        raise SourceError(path, "", error, "an image") from error
     return np.asarray(read_picture(path, "images", size or (0, 0), ""), np.uint8)
 
 

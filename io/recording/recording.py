@@ -38,25 +38,25 @@ class Source:
     starts
         Start of each file, seconds after the camera's frame 0; empty where each starts as the previous one ends.
     first_frame
-        boxes only: the number of the first frame in the file.
+        detections only: the number of the first frame in the file.
     frames
-        boxes only: number of frames; None where the last frame with a box is the last frame.
+        detections only: number of frames; None where the last frame with a box is the last frame.
     address
         Of a live stream (rtsp://...); empty for files.
     classes
-        boxes only: names (or numbers) of the classes to keep; empty for all.
+        detections only: names (or numbers) of the classes to keep; empty for all.
     least_score
-        boxes only: detections of lower score are left out.
+        detections only: detections of lower score are left out.
     view
-        boxes only: number of the camera in files of several cameras (WILDTRACK), from 0; None where it is not given.
+        detections only: number of the camera in files of several (WILDTRACK), from 0; None where it is not given.
     select
-        boxes only: pattern of image names in files of several cameras (COCO); empty for all.
+        detections only: pattern of image names in files of several cameras (COCO); empty for all.
     image_list
-        boxes only: file with the images of COCO results.
+        detections only: file with the images of COCO results.
     columns
-        boxes only: pairs of our name and a CSV or Parquet file's name of a column.
+        detections only: pairs of our name and a CSV or Parquet file's name of a column.
     appearance
-        boxes only: .npy file of appearance features, one row a detection in the order of the detections; None without.
+        detections only: .npy file of appearance features, a row for each detection in their order; None without.
     detector
         video and images only: a model in ONNX that finds people in them, or `HOG`; None for a run from pixels.
         `classes` and `least_score` are then those of the detector.

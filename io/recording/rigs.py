@@ -231,8 +231,9 @@ def _source(table: Table, *more_keys: str) -> Source:
     keys = _DETECTION_KEYS if detections else _DETECTOR_KEYS if kind in ("video", "images") and more_keys else ()
     table.allow("kind", "path", *keys, *(() if kind == "boxes" else more_keys))
     detector = _detector(table) if "detector" in table else None
-    if "features" in table and detector is None:
-        raise table.error("features", "features of no boxes", "a detector beside them")
+    unused = [key for key in ("features", "classes", "score") if key in table and detector is None and not detections]
+    if unused:
+        raise table.error(unused[0], f"{unused[0]} of no boxes", "a detector beside them")
     paths = table.paths("path")
     if any("://" in name for name in paths):
         return _live_source(table, kind)

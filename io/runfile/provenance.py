@@ -34,7 +34,7 @@ _VERSION = np.dtype([("name", "S32"), ("version", "S32")])
 SOURCE = np.dtype(
     [
         ("camera", _TEXT),
-        ("role", "S16"),  # frames or background
+        ("role", "S16"),  # frames, background or images
         ("kind", "S16"),
         ("path", _TEXT),
         ("files", "<i8"),  # 0 where nothing could be found
@@ -117,7 +117,7 @@ def read_provenance(group: h5py.Group) -> Provenance:
 
 
 def _checked_sources(dataset: h5py.Dataset) -> Rows:
-    if dataset.dtype != SOURCE or dataset.ndim != 1 or len(dataset) > 2 * limits.CAMERAS:
+    if dataset.dtype != SOURCE or dataset.ndim != 1 or len(dataset) > 3 * limits.CAMERAS:
         raise ValueError("sources of another form")
     return np.asarray(dataset[:])
 

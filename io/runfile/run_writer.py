@@ -21,7 +21,7 @@ _HELD_ROWS = 4096  # of one table, before they are written
 
 
 class RunWriter:
-    """Writes a run file as `PATH.part`, renamed by `finish`.
+    """Writes a run file as a part beside it, renamed by `finish`.
 
     Use it in a `with`: an exception before `finish` removes the part and leaves an older file of that name unchanged.
 

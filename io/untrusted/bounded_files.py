@@ -39,14 +39,12 @@ def read_text(path: Path, most: int = limits.TEXT_FILE) -> str:
 
 
 @contextmanager
-def reading(path: Path, expected: str, kind: type[InputError] = FormatError) -> Iterator[None]:
-    """Raise what keeps a file from being read whole as an error of a kind."""
+def reading(path: Path, expected: str, kind: type[InputError] = FormatError, key: str = "") -> Iterator[None]:
+    """Raise what keeps a file from being read whole as an error of a kind, at a key."""
     try:
         yield
-    except OSError as error:
-        raise kind(path, "", error.strerror or error, expected) from error
-    except ValueError as error:
-        raise kind(path, "", error, expected) from error
+    except (OSError, ValueError) as error:
+        raise kind(path, key, getattr(error, "strerror", None) or error, expected) from error
 
 
 def require_regular(path: Path) -> None:
@@ -78,19 +76,18 @@ def is_regular(path: Path) -> bool:
         return False
 
 
-def parse_xml(file: Path, expected: str) -> ElementTree.Element:
-    """The root of an XML file of the kind `expected`.
+def parse_xml(file: Path, expected: str, most: int = limits.TEXT_FILE) -> ElementTree.Element:
+    """The root of an XML file of the kind `expected`, of so many bytes at most.
 
     FormatError where it cannot be read, is no XML, or declares a document type.
     """
+    with reading(file, expected):
+        text = read_text(file, most)
     try:
-        text = read_text(file)
-        # Entities are declared in a document type, which no calibration has: refusing it leaves nothing to expand.
+        # Entities are declared in a document type, which no such file has: refusing it leaves nothing to expand.
         # The check is on decoded text and the parser gets that text, so no declared encoding can hide one.
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
             raise FormatError(file, "", "a document type declaration", f"{expected}, which has none")
         return ElementTree.fromstring(text)
-    except OSError as error:
-        raise FormatError(file, "", error.strerror or error, "a calibration file") from error
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise FormatError(file, "", f"what is not XML ({error})", expected) from error

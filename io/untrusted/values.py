@@ -14,7 +14,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from stseg.errors import FormatError, OutputError
+from stseg.errors import ConfigError, FormatError, OutputError
 from stseg.io.untrusted import limits
 
 _LONGEST_VALUE = 60
@@ -70,6 +70,13 @@ def is_path(text: str) -> bool:
         and b"\0" not in data
         and all(len(part) <= limits.PATH_PART for part in data.split(b"/"))
     )
+
+
+def require_within(option: str, value: float, bounds: tuple[float, float]) -> None:
+    """Refuse a number of the command line outside its bounds; raises ConfigError."""
+    low, high = bounds
+    if not low <= value <= high:
+        raise ConfigError("command line", option, repr(value), f"a number from {low:g} to {high:g}")
 
 
 def require_utf8(path: Path, purpose: str) -> None:

@@ -5,10 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.calibrate.scene import size_of
 from stseg.commands.terminal.standard_error import TerminalReporter
-from stseg.errors import ConfigError
-from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import abbreviated, parse_whole
 from stseg.tasks import simulation
 
 
@@ -91,7 +89,7 @@ def simulate(
         cameras=cameras,
         seconds=seconds,
         frame_rate=frame_rate,
-        size=None if size is None else _size(size),
+        size=None if size is None else size_of(size),
         noise=noise,
         shadows=shadows,
         light_drift=light_drift,
@@ -99,11 +97,3 @@ def simulate(
         seed=seed,
     )
     print(f"{film.rig_path}: {film.frames} frames of {film.cameras} cameras; truth in {film.truth_path.name}")
-
-
-def _size(text: str) -> tuple[int, int]:
-    sides = [parse_whole(part, 1, limits.SIDE) for part in text.split(",")]
-    if len(sides) != 2 or sides[0] is None or sides[1] is None or sides[0] * sides[1] > limits.PIXELS:
-        expected = f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
-        raise ConfigError("command line", "--size", abbreviated(text), expected)
-    return sides[0], sides[1]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
+from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles, ground_of
 from stseg.geometry import Rig
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate
 from stseg.records.people import Explanation, People
@@ -42,7 +42,7 @@ class CommittedFrames:
 
     commit: Commit
     candidates: Rows
-    parts: Floats
+    parts: Singles
     rates: Rows
     timings: Rows
     appearance: Rows
@@ -179,7 +179,7 @@ def _candidate_rows(frame: int, status: int, people: People) -> Rows:
 def within_area(commit: Commit, rig: Rig) -> Commit:
     """A commit without the rows, and labels, of people outside the area; in closed rooms nobody is outside."""
     rows = commit.trajectory
-    inside = rig.grid.contains(np.stack([rows["x"], rows["y"]], -1))
+    inside = rig.grid.contains(ground_of(rows))
     if rig.closed or inside.all():
         return commit
     outside, pairs = rows[~inside], zip(commit.frames, commit.labels, strict=True)

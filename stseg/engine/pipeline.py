@@ -37,10 +37,6 @@ from stseg.trajectories.final_tracks import (
     final_tracks,
 )
 
-_HUANG_WANG = "stseg.baselines.huang_wang_2012.proposals:Proposals"
-CANDIDATE_SOURCES = {"volume": _HUANG_WANG, "probability": _HUANG_WANG, "both": _HUANG_WANG}
-"""Module and class of each `proposals.source` beside "lattice", the detector's; imported where it is asked for."""
-
 
 class CandidateSource(Protocol):
     """Candidates of a frame besides those of the detector."""
@@ -104,8 +100,8 @@ def find_candidate_source(rig: Rig, kinds: Sequence[str], config: Config) -> Can
     """The source of candidates that the configuration names; None for the detector's alone."""
     if config.proposals.source == "lattice":
         return None
-    module, found = CANDIDATE_SOURCES[config.proposals.source].split(":")
-    return cast(CandidateSource, getattr(import_module(module), found)(rig, kinds, config))
+    proposals = import_module("stseg.baselines.huang_wang_2012.proposals")  # where it is asked for
+    return cast(CandidateSource, proposals.Proposals(rig, kinds, config))
 
 
 def decides_by_appearance(tracker: type[TrackingMethod], config: Config) -> bool:

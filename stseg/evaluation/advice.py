@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from stseg.arrays import Rows
+from stseg.arrays import Rows, ground_of
 from stseg.errors import FormatError
-from stseg.evaluation.alignment import best_motion, ground_of, moved_rows, number_met, places_by_frame, sampled
+from stseg.evaluation.alignment import best_motion, moved_rows, number_met, places_by_frame, sampled
 
 _MATCHING, _GAIN = 0.5, 0.3
 """Least share of the truth's rows that meet tracks under a reading that is named, and least gain over the given one."""

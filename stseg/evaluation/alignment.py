@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from stseg.arrays import Floats, Ints, Rows
+from stseg.arrays import Floats, Ints, Rows, ground_of
 from stseg.errors import FormatError
 from stseg.evaluation.sequence import match, require_rows
 from stseg.geometry.distances import distances
@@ -70,11 +70,6 @@ def best_motion(truth: Rows, trajectory: Rows, gate: float, alignment: Alignment
         if best == previous:
             break
     return best
-
-
-def ground_of(rows: Rows) -> Floats:
-    """Places, float64 (n, 2)."""
-    return np.stack([rows["x"], rows["y"]], -1)
 
 
 def sampled(rows: Rows) -> Rows:

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.arrays import Flags, Floats, Ints, Rows, ground_of
 from stseg.errors import FormatError
 
 _PAIR = 1e3  # reward of a pair, metres: more than the distances of a whole frame
@@ -171,7 +171,7 @@ def align_frames(
     relevant, evaluated = _inside(truth, area), _inside(trajectory, area)
     if ignore_flagged and "flag" in (truth.dtype.names or ()):
         relevant &= truth["flag"] == 0
-    person_ground, track_ground = _ground(truth), _ground(trajectory)
+    person_ground, track_ground = ground_of(truth), ground_of(trajectory)
     present = np.union1d(person_index, track_index)
     for people, tracks in zip(_runs(person_index, present), _runs(track_index, present), strict=True):
         if not (relevant[people].all() and evaluated[tracks].all()):
@@ -190,7 +190,7 @@ def align_frames(
 
 def require_rows(rows: Rows, name: str) -> None:
     """Raise FormatError where a position is not finite or an id occurs twice in a frame."""
-    lost = ~np.isfinite(_ground(rows)).all(axis=1)
+    lost = ~np.isfinite(ground_of(rows)).all(axis=1)
     if lost.any():
         row = rows[lost][0]
         raise FormatError(name, f"frame {row['frame']}, id {row['id']}", "a position that is not finite", "metres")
@@ -219,10 +219,6 @@ def _runs(index: Ints, present: Ints) -> list[slice]:
     starts = np.searchsorted(index, present, side="left").tolist()
     stops = np.searchsorted(index, present, side="right").tolist()
     return [slice(start, stop) for start, stop in zip(starts, stops, strict=True)]
-
-
-def _ground(rows: Rows) -> Floats:
-    return np.stack([rows["x"], rows["y"]], axis=-1)
 
 
 def _inside(rows: Rows, area: Area | None) -> Flags:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit, ndtr
 
-from stseg.arrays import Flags, Floats, Ints, Rows, by_track, columns
+from stseg.arrays import Flags, Floats, Ints, Rows, by_track, columns, ground_of
 from stseg.geometry.grid import inside_polygon
 
 
@@ -25,7 +25,7 @@ class Zone:
 
     def probability(self, trajectory: Rows) -> Floats:
         """Probability that each row is inside, float64 (n,), by its covariance and the nearest edge."""
-        ground = np.stack([trajectory["x"], trajectory["y"]], -1)
+        ground = ground_of(trajectory)
         edges = [Line("", np.append(ring, ring[:1], axis=0)).distance(ground) for ring in self.rings]
         away = np.min(edges, axis=0) / np.sqrt(np.maximum(trajectory["xx"] + trajectory["yy"], 1e-12) / 2)
         return np.asarray(ndtr(np.where(self.contains(ground), away, -away)))
@@ -85,7 +85,7 @@ def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -
     the square of SYSTEMATIC_SHARE of the mean.
     """
     index = np.searchsorted(frames, trajectory["frame"])
-    inside = zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))
+    inside = zone.contains(ground_of(trajectory))
     present = expit(trajectory["score"].astype(float)) * zone.probability(trajectory)
     rows = np.zeros(len(frames), COUNT)
     rows["frame"], rows["time"], rows["zone"] = frames, frames / frame_rate, zone.name
@@ -108,7 +108,7 @@ def zone_visits(zone: Zone, trajectory: Rows, frame_rate: float, patience: float
     """Stays of tracks in a zone, VISIT (n,), by start; absences of up to `patience` seconds do not end a stay."""
     visits = []
     for track in by_track(trajectory):
-        inside = zone.contains(np.stack([track["x"], track["y"]], -1))
+        inside = zone.contains(ground_of(track))
         starts, stops = _spells(inside, track["frame"], round(patience * frame_rate))
         for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
             first, last = int(track["frame"][start]), int(track["frame"][stop - 1])
@@ -147,7 +147,7 @@ def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float)
     """
     found = []
     for stay in (stay for track in by_track(trajectory) for stay in stays(track, frame_rate)):
-        ground = np.stack([stay["x"], stay["y"]], -1)
+        ground = ground_of(stay)
         kept: list[tuple[int, float, int]] = []
         for row, share, side in _intersections(line, ground):
             since = ground[kept[-1][0] + 1 : row + 1] if kept else ground[:0]

@@ -10,6 +10,12 @@ from stseg.geometry import Grid
 from stseg.measures.areas import COUNT, CROSSING, VISIT, Areas, line_crossings, standard_error, zone_counts, zone_visits
 from stseg.measures.motion import flow_field, motions, spacings, track_measures
 
+_PATIENCE = 1.0
+"""Absence that does not end a visit, seconds."""
+_BAND = 0.2
+"""Distance from a line within which crossing it back cancels a crossing, metres."""
+_SIDE = 0.5
+"""Side of a bin of density and flow, metres."""
 ZONE = columns(
     "zone:O area:<f8 mean_people:<f8 deviation:<f8 most_people:<i8 entries:<i8 exits:<i8 visits:<i8 "
     "mean_dwell:<f8 median_dwell:<f8 mean_density:<f8"
@@ -41,17 +47,7 @@ class Measures:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def measure_tracks(
-    trajectory: Rows,
-    frames: Ints,
-    frame_rate: float,
-    grid: Grid,
-    areas: Areas,
-    *,
-    patience: float = 1.0,
-    band: float = 0.2,
-    side: float = 0.5,
-) -> Measures:
+def measure_tracks(trajectory: Rows, frames: Ints, frame_rate: float, grid: Grid, areas: Areas) -> Measures:
     """Measure tracks in zones, at lines and over the ground.
 
     Parameters
@@ -65,16 +61,10 @@ def measure_tracks(
         The ground.
     areas
         Zones and lines.
-    patience
-        Absence that does not end a visit, seconds.
-    band
-        Distance from a line within which crossing it back cancels a crossing, metres.
-    side
-        Side of a bin of density and flow, metres.
     """
     people = [zone_counts(zone, trajectory, frames, frame_rate) for zone in areas.zones]
-    visits = [zone_visits(zone, trajectory, frame_rate, patience) for zone in areas.zones]
-    crossings = [line_crossings(line, trajectory, frame_rate, band) for line in areas.lines]
+    visits = [zone_visits(zone, trajectory, frame_rate, _PATIENCE) for zone in areas.zones]
+    crossings = [line_crossings(line, trajectory, frame_rate, _BAND) for line in areas.lines]
     shapes = zip(areas.zones, people, visits, strict=True)
     zones = [_zone(z.name, z.area, count, stays, standard_error(count, frame_rate)) for z, count, stays in shapes]
     minutes = max(len(frames) / frame_rate / 60, 1e-9)
@@ -88,7 +78,7 @@ def measure_tracks(
         track_measures(trajectory, frame_rate),
         motions(trajectory, frame_rate),
         spacings(trajectory, frame_rate),
-        flow_field(trajectory, frames, frame_rate, grid.x, grid.y, side),
+        flow_field(trajectory, frames, frame_rate, grid.x, grid.y, _SIDE),
     )
 
 

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows, by_track, columns
+from stseg.arrays import Floats, Ints, Rows, by_track, columns, ground_of
 from stseg.measures.areas import stays
 
 TRACK_MEASURE = columns(
@@ -49,7 +49,7 @@ def _motion(piece: Rows, offset: Ints, frame_rate: float) -> Sequence[float]:
     if len(piece) < 3:
         return (np.nan,) * 6
     weights, growth = _parabola(tuple(offset.tolist()), frame_rate)
-    velocity, acceleration = weights @ _ground(piece)
+    velocity, acceleration = weights @ ground_of(piece)
     xx, xy, yy = (float(piece[name].mean()) for name in ("xx", "xy", "yy"))
     speed, heading = float(np.hypot(*velocity)), float(np.arctan2(velocity[1], velocity[0]))
     ahead, across = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
@@ -83,12 +83,12 @@ def track_measures(trajectory: Rows, frame_rate: float) -> Rows:
 def _distance(track: Rows, frame_rate: float) -> float:
     """Way of a track in steps of half a second, metres."""
     sampled = np.unique(np.append(np.arange(0, len(track), max(1, round(frame_rate / 2))), len(track) - 1))
-    return float(np.hypot(*np.diff(_ground(track)[sampled], axis=0).T).sum())
+    return float(np.hypot(*np.diff(ground_of(track)[sampled], axis=0).T).sum())
 
 
 def velocities(track: Rows, frame_rate: float) -> Floats:
     """Velocity of one track at each row over one second around it, metres a second, float64 (n, 2)."""
-    ground, half = _ground(track), max(1, round(frame_rate / 2))
+    ground, half = ground_of(track), max(1, round(frame_rate / 2))
     frame = track["frame"].astype(float)
     before, after = np.clip(frame - half, frame[0], frame[-1]), np.clip(frame + half, frame[0], frame[-1])
     span = np.maximum(after - before, 1) / frame_rate
@@ -101,7 +101,7 @@ def spacings(trajectory: Rows, frame_rate: float) -> Rows:
     table, rows = trajectory[np.argsort(trajectory["frame"], kind="stable")], []
     for people in np.split(table, np.flatnonzero(np.diff(table["frame"])) + 1):
         if len(people) > 1:
-            ground = _ground(people)
+            ground = ground_of(people)
             away = np.hypot(*np.moveaxis(ground[:, None] - ground[None], -1, 0))
             np.fill_diagonal(away, np.inf)
             nearest = away.min(axis=1)
@@ -132,7 +132,3 @@ def flow_field(
     cells["flow_x"] = np.bincount(index, velocity[inside, 0], wide * tall) / scale
     cells["flow_y"] = np.bincount(index, velocity[inside, 1], wide * tall) / scale
     return cells
-
-
-def _ground(track: Rows) -> Floats:
-    return np.stack([track["x"], track["y"]], -1)

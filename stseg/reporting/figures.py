@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import AnyArray, Boxes, Bytes, Labels, Observation, Rows
+from stseg.arrays import AnyArray, Boxes, Bytes, Labels, Observation, Rows, ground_of
 from stseg.geometry import Rig
 from stseg.reporting.charts import clock_time
 from stseg.reporting.pictures.canvas import blank, chips, disc, fading_stroke, text
@@ -149,12 +149,12 @@ class RunFilm:
     def _plan_of(self, frame: int, recent: Rows) -> Bytes:
         canvas, plan = self._ground.copy(), self._plan
         present = recent[recent["frame"] == frame]
-        places = plan.pixel(np.stack([present["x"], present["y"]], -1))
+        places = plan.pixel(ground_of(present))
         for row, place in zip(present, places, strict=True):
             path = recent[recent["id"] == row["id"]]
             opacity = 1 - 0.85 * (frame - path["frame"][:-1]) / max(self._trail, 1)
             colour = track_colour(int(row["id"]))
-            fading_stroke(canvas, plan.pixel(np.stack([path["x"], path["y"]], -1)), colour, 3, opacity)
+            fading_stroke(canvas, plan.pixel(ground_of(path)), colour, 3, opacity)
             disc(canvas, place, 8, PAPER)
             disc(canvas, place, 6.5, colour)
         ids = present["id"].tolist()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Bytes, Flags, Floats, Ints, Rows
+from stseg.arrays import Bytes, Flags, Floats, Ints, Rows, ground_of
 from stseg.records.point_probability import point_probability
 
 DOUBT_LIMIT = 0.9
@@ -60,7 +60,7 @@ def exchange_chances(trajectory: Rows, tracks: Rows, frame_rate: float, border: 
     for name in ("first", "last"):
         for track in tracks[(tracks[name] > rows["frame"][:1]) & (tracks[name] < rows["frame"][-1:])]:
             people = rows[slice(*np.searchsorted(rows["frame"], [track[name], track[name] + 1]))]
-            ground, end = np.stack([people["x"], people["y"]], -1), people["id"] == track["id"]
+            ground, end = ground_of(people), people["id"] == track["id"]
             if end.any() and (np.minimum(ground[end] - border[0], border[1] - ground[end]) > _BORDER_WIDTH).all():
                 neighbours = ~end & (np.hypot(*(ground - ground[end][0]).T) < _END_DISTANCE)
                 rate[[place[track] for track in people["id"][neighbours].tolist() if track in place]] += _RATE_NEAR_ENDS

@@ -20,7 +20,7 @@ from stseg.io.config_file import parse_config
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import Run, read_run
-from stseg.io.untrusted.bounded_files import read_text
+from stseg.io.untrusted.bounded_files import read_text, reading
 from stseg.records.tables import Tracks
 from stseg.trajectories.final_tracks import CommittedRows
 
@@ -72,6 +72,10 @@ def correct(run: Run | Path | str, answers: Path | str, output: Path | str, *, o
     found, output, answers = run_of(run), Path(output), Path(answers)
     require_output(output, overwrite, Inputs(found.files, [answers]))
     rows = read_answers(answers, ACTIONS)
+    with reading(answers, "answers as CSV"):
+        text = read_text(answers)
+    if "\0" in text:
+        raise FormatError(answers, "", "a NUL character", "answers as CSV")
     given = tuple(Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows)
     corrected = corrected_tracks(found, given)
     write_corrected(
@@ -81,7 +85,7 @@ def correct(run: Run | Path | str, answers: Path | str, output: Path | str, *, o
         corrected.answered,
         corrected.new_ids,
         corrected.names,
-        read_text(answers),
+        text,
         overwrite,
     )
     return CorrectedRun(read_run(output), given)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Bytes, Ints, Observation, Rows, Singles
+from stseg.arrays import Bytes, Ints, Observation, Rows, Singles, ground_of
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.offline.frame_range import FrameSpan, frames_of_run
@@ -151,7 +151,7 @@ def _ids(
 
 def _placed(people: Rows) -> PlacedPeople:
     covariance = np.stack([people[name] for name in ("xx", "xy", "xy", "yy")], -1).reshape(-1, 2, 2)
-    ground, height = np.stack([people["x"], people["y"]], -1), people["height"].astype(float)
+    ground, height = ground_of(people), people["height"].astype(float)
     return PlacedPeople(ground, covariance, height, people["id"].astype(np.int64))
 
 

@@ -1,6 +1,5 @@
 """`stseg.simulate`: a rendered scene with ground truth."""
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,11 +10,11 @@ from stseg.errors import ConfigError
 from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import abbreviated
+from stseg.io.untrusted.values import abbreviated, one_of, require_within
 from stseg.simulation import NAMED, SceneFilm, SceneSpec, Spoil
 from stseg.simulation.spoiling.spoil import STRENGTHS
 
-_BOUNDS = {"seconds": (0.0, 86_400.0), "frame_rate": limits.FRAME_RATE}
+_BOUNDS = {"seconds": (0.0, 86_400.0), "frame_rate": limits.FRAME_RATE, "cameras": (1, limits.CAMERAS)}
 
 
 @dataclass(frozen=True)
@@ -71,14 +70,13 @@ def simulate(
     InputError
         For a scene, kind of error or number that is none.
     """
-    for name, (low, high) in _BOUNDS.items():
-        value = changes.get(name)
-        if value is not None and not low <= value <= high:
-            option = f"--{name.replace('_', '-')}"
-            raise ConfigError("command line", option, repr(value), f"a number from {low:g} to {high:g}")
     given = {key: value for key, value in changes.items() if value is not None}
+    for name in _BOUNDS.keys() & given.keys():
+        require_within(f"--{name.replace('_', '-')}", given[name], _BOUNDS[name])
+    if scene not in NAMED:
+        raise ConfigError("command line", "--scene", repr(scene), one_of(scene, NAMED))
     errors, folder = [_spoil(text) for text in spoil], Path(folder)
-    film = SceneFilm(replace(_named(scene), **given), errors)
+    film = SceneFilm(replace(NAMED[scene], **given), errors)
     with reporter_of(progress).progress("filming", film.frames) as advance:
         write_scene(
             folder,
@@ -91,14 +89,6 @@ def simulate(
     return SimulatedRecording(
         folder / rig_name(film.kinds[0]), folder / "truth.csv", film.frames, len(film.rig.cameras)
     )
-
-
-def _named(name: str) -> SceneSpec:
-    if name in NAMED:
-        return NAMED[name]
-    similar = difflib.get_close_matches(name, NAMED, n=1)
-    suggestion = f"; did you mean {similar[0]}?" if similar else ""
-    raise ConfigError("command line", "--scene", repr(name), f"one of {', '.join(NAMED)}{suggestion}")
 
 
 def _body(spec: SceneSpec) -> BodyPrior:

@@ -9,7 +9,7 @@ import reference_core as reference
 from checks import drawn, numbers
 from hypothesis import strategies as st
 from scenes import CONFIG, found, people
-from simulated_people import smoothed_paths
+from simulated_people import smoothed
 
 from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
 from stseg.baselines.huang_wang_2012.kalman_filters import corrected_filters, initial, innovations, predicted_filters
@@ -311,7 +311,7 @@ def test_smoothed_places_err_by_as_much_as_claimed() -> None:
     noise = np.asarray(np.tile(NOISE, (STEPS, 1, 1)), np.float64)
     measured = true + lasting_errors(NOISE, WALKS, STEPS, SECONDS)
     frames, one = np.arange(STEPS), np.ones(STEPS, np.int64)
-    paths = [smoothed_paths(frames, path, noise, 1 / SECONDS, one) for path in measured]
+    paths = [smoothed(frames, path, noise, 1 / SECONDS, one) for path in measured]
     pairs = [one for path, real in zip(paths, true, strict=True) for one in zip(path[0] - real, path[1], strict=True)]
     squares = [square(off, covariance) for off, covariance in pairs]
     assert np.mean(squares) == pytest.approx(2.0, abs=4 * 2 / np.sqrt(WALKS))

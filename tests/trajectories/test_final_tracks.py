@@ -7,19 +7,7 @@ import pytest
 from checks import drawn, numbers
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
-from simulated_people import (
-    BORDER,
-    CONFIG,
-    RATE,
-    committed,
-    gone,
-    rows_of,
-    runs,
-    smoothed_paths,
-    straight,
-    swapped,
-    visit,
-)
+from simulated_people import BORDER, CONFIG, RATE, committed, gone, rows_of, runs, smoothed, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import MotionConfig
@@ -140,7 +128,7 @@ def test_nobody_dropped_tracks_and_a_single_measurement() -> None:
     assert story(found.events) == [(10, b"dropped", 7, 0)] and set(found.trajectory["id"].tolist()) == {5}
     ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
     one = np.ones(1, np.int64)
-    for same in zip(smoothed_paths(one, ground, noise, SMOOTHER_RATE, one), (ground, noise), strict=True):
+    for same in zip(smoothed(one, ground, noise, SMOOTHER_RATE, one), (ground, noise), strict=True):
         np.testing.assert_array_equal(*same)
 
 
@@ -183,7 +171,7 @@ def measured(draw: st.DrawFn) -> tuple[Ints, Floats, Floats]:
 @drawn(100, measured())
 def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = path
-    places, spread = smoothed_paths(frames, ground, noise, SMOOTHER_RATE, np.ones_like(frames))
+    places, spread = smoothed(frames, ground, noise, SMOOTHER_RATE, np.ones_like(frames))
     expected, covariance = conditioned(frames / SMOOTHER_RATE, ground, noise)
     np.testing.assert_allclose(places, expected, atol=1e-9, rtol=0)
     np.testing.assert_allclose(spread, covariance, atol=1e-9, rtol=0)
@@ -194,7 +182,7 @@ def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Float
 def test_covariances_without_full_rank_are_smoothed(yy: float, xy: float) -> None:
     """Rows that say their place exactly, or along one line, or that float32 has rounded."""
     ground, noise = np.array([[0.1 * k, 0.2] for k in range(4)]), np.tile([[yy, xy], [xy, yy]], (4, 1, 1))
-    places, spread = smoothed_paths(np.arange(4), ground, noise, SMOOTHER_RATE, np.ones(4, np.int64))
+    places, spread = smoothed(np.arange(4), ground, noise, SMOOTHER_RATE, np.ones(4, np.int64))
     assert np.isfinite(places).all() and np.isfinite(spread).all()
     np.testing.assert_allclose(places, ground, atol=0.1)
 
@@ -213,18 +201,18 @@ def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
     rows["x"], rows["y"], rows["height"] = rows["raw_x"], rows["raw_y"], 1.7
     rows = rows[np.lexsort((rows["id"], rows["frame"]))]
     true = true[np.lexsort((np.repeat([4, 2], [60, 20]), np.concatenate([np.arange(60), np.arange(0, 60, 3)])))]
-    smoothed = rows.copy()
-    smooth_places(smoothed, SMOOTHER_RATE, MOTION)
+    walked = rows.copy()
+    smooth_places(walked, SMOOTHER_RATE, MOTION)
     for name in ("frame", "id", "raw_x", "raw_y", "height"):
-        np.testing.assert_array_equal(smoothed[name], rows[name])
+        np.testing.assert_array_equal(walked[name], rows[name])
     for identity, share in ((4, 0.7), (2, 0.95)):
         own = rows["id"] == identity
         raw, now = (
             float(np.hypot(*(np.column_stack([table[x], table[y]])[own] - true[own]).T).mean())
-            for table, x, y in ((rows, "raw_x", "raw_y"), (smoothed, "x", "y"))
+            for table, x, y in ((rows, "raw_x", "raw_y"), (walked, "x", "y"))
         )
         assert now < share * raw
-        assert (smoothed["xx"][own] < 0.1**2).all()
+        assert (walked["xx"][own] < 0.1**2).all()
 
 
 @drawn(100, measured(), measured())
@@ -232,8 +220,8 @@ def test_paths_at_once_are_as_alone(one: tuple[Ints, Floats, Floats], other: tup
     frames, ground, noise = (np.concatenate(pair) for pair in zip(one, other, strict=True))
     track = np.repeat([1, 2], [len(one[0]), len(other[0])])
     with patch("stseg.trajectories.smoother._ROWS_AT_ONCE", 5):
-        both = smoothed_paths(frames, ground, noise, SMOOTHER_RATE, track)
+        both = smoothed(frames, ground, noise, SMOOTHER_RATE, track)
     for rows in (track == 1, track == 2):
-        alone = smoothed_paths(frames[rows], ground[rows], noise[rows], SMOOTHER_RATE, track[rows])
+        alone = smoothed(frames[rows], ground[rows], noise[rows], SMOOTHER_RATE, track[rows])
         np.testing.assert_array_equal(both[0][rows], alone[0])
         np.testing.assert_array_equal(both[1][rows], alone[1])

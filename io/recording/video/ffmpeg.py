@@ -56,7 +56,7 @@ def open_video(path: Path, key: str) -> cv2.VideoCapture:
     size = tuple(capture.get(side) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
     if size[0] * size[1] > limits.PIXELS or max(size) > limits.SIDE:
         capture.release()
-        raise SourceError(path, key, f"frames of {size[0]:g}x{size[1]:g}", f"at most {limits.PIXELS:.0e} pixels")
+        raise SourceError(path, key, f"frames of {size[0]:g}x{size[1]:g}", f"at most {limits.PIXELS} pixels")
     return capture
 
 

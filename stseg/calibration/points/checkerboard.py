@@ -41,10 +41,8 @@ def find_corners(image: Bytes, board: tuple[int, int]) -> Floats | None:
     return np.asarray(cv2.cornerSubPix(grey, corners, (5, 5), (-1, -1), _REFINE), float).reshape(-1, 2)
 
 
-def fit_lens(
-    name: str, corners: Sequence[Floats], board: tuple[int, int], square: float, size: tuple[int, int]
-) -> LensFit:
-    """Fit the lens to the corners of several views of a board.
+def fit_lens(name: str, corners: Sequence[Floats], board: tuple[int, int], size: tuple[int, int]) -> LensFit:
+    """Fit the lens to the corners of several views of a board; it does not depend on the size of the squares.
 
     Parameters
     ----------
@@ -54,8 +52,6 @@ def fit_lens(
         `find_corners` of each view.
     board
         Columns and rows of inner corners.
-    square
-        Side of a square, metres.
     size
         Width and height of the images, pixels.
 
@@ -68,7 +64,7 @@ def fit_lens(
         expected = f"at least {MIN_VIEWS}, tilted and all over the image (is --board the number of inner corners?)"
         raise CalibrationError(name, "checkerboard", f"{len(corners)} views of the whole board", expected)
     chosen = even_rows(len(corners), _MAX_VIEWS)
-    grid = np.stack(np.meshgrid(np.arange(board[0]), np.arange(board[1])), -1).reshape(-1, 2) * square
+    grid = np.stack(np.meshgrid(np.arange(board[0]), np.arange(board[1])), -1).reshape(-1, 2)
     points = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
     pixels = [corners[k].astype(np.float32) for k in chosen]
     error, matrix, distortion, _, _, deviation, _, _ = cv2.calibrateCameraExtended(

@@ -7,14 +7,16 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.calibration.points.checkerboard import find_corners, fit_lens
-from stseg.commands.calibrate.scene import numbers
 from stseg.errors import ConfigError
 from stseg.io.calibrations.xml_files import write_opencv_lens
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
+from stseg.io.untrusted.values import abbreviated, parse_whole
 from stseg.tasks.calibration.automatic import uncalibrated_camera
 
+_MOST_CORNERS = 1000
+"""Inner corners along a side of the board."""
 _WORTH = 0.02
 """Mean movement of the corners that makes a view a new one, in image widths."""
 
@@ -25,7 +27,6 @@ def calibrate_lens(
     *,
     board: Annotated[str, Parameter(metavar="COLUMNS,ROWS")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="LENS.xml")],
-    square: float = 1.0,
     every: int = 5,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
@@ -44,18 +45,16 @@ def calibrate_lens(
         Columns and rows of the board's inner corners (one less than squares).
     output
         OpenCV XML with camera_matrix and distortion_coefficients.
-    square
-        Side of a square, in any unit; the lens does not depend on it.
     every
         Frames from one that is looked at to the next.
     overwrite
         Replace the file if it exists.
     """
     require_output(output, overwrite, Inputs([video]))
-    columns, rows = (int(side) for side in numbers("--board", board, "columns,rows of inner corners", 2))
-    if min(columns, rows) < 3 or every < 1 or not square > 0:
-        given = f"{board}, {every}, {square:g}"
-        raise ConfigError("--board, --every, --square", "", given, "3 or more; 1 or more; above 0")
+    columns, rows = ([parse_whole(part, 3, _MOST_CORNERS) for part in board.split(",")] + [None, None])[:2]
+    if columns is None or rows is None or board.count(",") != 1 or every < 1:
+        expected = f"columns,rows of inner corners, 3 or more and at most {_MOST_CORNERS}; 1 or more"
+        raise ConfigError("--board, --every", "", f"{abbreviated(board)}, {every}", expected)
     camera = uncalibrated_camera(video.stem, video)
     stream, size = open_stream(Source("video", video), camera), camera.size
     found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []
@@ -67,7 +66,7 @@ def calibrate_lens(
             stream.skip(every - 1)
     finally:
         stream.close()
-    fit = fit_lens(str(video), found, (columns, rows), square, size)
+    fit = fit_lens(str(video), found, (columns, rows), size)
     write_opencv_lens(output, fit.lens, overwrite)
     focal, (u, v) = fit.lens.matrix[0, 0], fit.lens.matrix[:2, 2]
     print(

@@ -12,7 +12,7 @@ from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.io.recording.recording import CameraSource, Source, SourceKind
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import abbreviated, parse_numbers
+from stseg.io.untrusted.values import abbreviated, parse_numbers, parse_whole
 
 
 @Parameter(name="*")
@@ -105,11 +105,11 @@ def _filled(pattern: str, name: str) -> Path:
 
 def size_of(text: str) -> tuple[int, int]:
     """Width and height from the command line."""
-    width, height = numbers("--size", text, "width,height in whole pixels", 2)
-    if width != int(width) or height != int(height) or min(width, height) < 1 or width * height > limits.PIXELS:
-        expected = f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
-        raise ConfigError("--size", "", abbreviated(text), expected)
-    return int(width), int(height)
+    sides = [parse_whole(part, 1, limits.SIDE) for part in text.split(",")]
+    if len(sides) != 2 or sides[0] is None or sides[1] is None or sides[0] * sides[1] > limits.PIXELS:
+        expected = f"width,height in whole pixels, at most {limits.PIXELS} in all"
+        raise ConfigError("command line", "--size", abbreviated(text), expected)
+    return sides[0], sides[1]
 
 
 def area_of(text: str) -> tuple[float, float, float, float]:

@@ -8,7 +8,7 @@ from shlex import quote
 import cv2
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Observation, Rows
+from stseg.arrays import AnyArray, Bytes, Observation, Rows, ground_of
 from stseg.geometry import Camera, Grid, Rig
 from stseg.reporting.charts import clock_time
 from stseg.reporting.figures import backdrop
@@ -72,7 +72,7 @@ def plan_film(
     tracks = []
     for identity in np.unique(rows["id"]).tolist():
         path = rows[rows["id"] == identity]
-        moment, place = np.searchsorted(frames, path["frame"]), np.round(np.stack([path["x"], path["y"]], -1), 2)
+        moment, place = np.searchsorted(frames, path["frame"]), np.round(ground_of(path), 2)
         colour = hex_colour(track_colour(identity)) if identity in ids else _OTHERS
         tracks.append({"id": identity, "colour": colour, "moment": moment.tolist(), "place": place.tolist()})
     clock = [clock_time(frame / frame_rate) for frame in frames.tolist()]
@@ -105,7 +105,7 @@ def moment_picture(
 
 
 def _crop(picture: Bytes, camera: Camera, rows: Rows) -> Bytes:
-    ground = np.stack([rows["x"], rows["y"]], -1)
+    ground = ground_of(rows)
     pixel = np.concatenate([camera.project(ground, 0.0)[0], camera.project(ground, 1.9)[0]])
     pixel = pixel[np.isfinite(pixel).all(axis=1)] * picture.shape[1] / camera.size[0]
     if not len(pixel):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows
+from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows, ground_of
 from stseg.geometry import Grid, Rig
 from stseg.reporting.pictures.canvas import chip, chips, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed
@@ -86,7 +86,7 @@ def dwell_places(trajectory: Rows, bins: Bins, most: int = 3) -> list[DwellPlace
 
     Greedy: the place with most time, then the next in the remaining time.
     """
-    remaining = np.stack([trajectory["x"], trajectory["y"]], -1)
+    remaining = ground_of(trajectory)
     even = np.pi * _DWELL_RADIUS**2 / ((bins.x[1] - bins.x[0]) * (bins.y[1] - bins.y[0]))
     found: list[DwellPlace] = []
     total = max(len(remaining), 1)

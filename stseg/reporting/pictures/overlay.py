@@ -7,7 +7,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Floats, Rows
+from stseg.arrays import AnyArray, Bytes, Floats, Rows, ground_of
 from stseg.bodies.pillars import PROFILE
 from stseg.geometry import Camera, Grid
 from stseg.geometry.rig import BODY_HEIGHT
@@ -140,7 +140,7 @@ def _draw_pillar(canvas: Bytes, view: OverlayView, row: np.void) -> None:
 def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail: int) -> None:
     """The trail on the ground, fading with age."""
     rows = rows[np.argsort(rows["frame"], kind="stable")]
-    pixel = view.pixel(np.stack([rows["x"], rows["y"]], -1), 0.0)
+    pixel = view.pixel(ground_of(rows), 0.0)
     colour = track_colour(int(rows["id"][0]))
     age = (frame - rows["frame"][:-1]) / max(trail, 1)
     fading_stroke(canvas, pixel, colour, 3, 1 - 0.85 * age)
@@ -148,7 +148,7 @@ def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail:
 
 def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
     """Ids above the heads."""
-    heads = view.pixel(np.stack([people["x"], people["y"]], -1), people["height"] + 0.12)
+    heads = view.pixel(ground_of(people), people["height"] + 0.12)
     inside = np.isfinite(heads).all(axis=1) & (heads >= 0).all(axis=1) & (heads < view.size).all(axis=1)
     heads, people = heads[inside], people[inside]
     ids, bounds = people["id"].tolist(), (4, 4, view.size[0] - 4, view.size[1] - 4)

@@ -6,7 +6,7 @@ from types import MappingProxyType
 import cv2
 import numpy as np
 
-from stseg.arrays import Bytes, Floats, Rows, by_track
+from stseg.arrays import Bytes, Floats, Rows, by_track, ground_of
 from stseg.geometry import Camera, Grid, Rig
 from stseg.reporting.pictures.canvas import MAX_LABELS, chips, dashes, disc, fill, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, Picture, mixed, track_colour
@@ -162,7 +162,7 @@ def _paths(table: Rows) -> list[tuple[int, Floats]]:
     # Frames from one row to the next where nothing is missing: truth may be sparse.
     step = int(np.diff(numbers).min()) if len(numbers) > 1 else 1
     for rows in by_track(table):
-        places = np.stack([rows["x"], rows["y"]], -1)
+        places = ground_of(rows)
         gaps = np.flatnonzero(np.diff(rows["frame"]) > step) + 1
         paths.append((int(rows["id"][0]), np.insert(places, gaps, np.nan, axis=0)))
     return paths

@@ -27,12 +27,16 @@ from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import write_rig
 from stseg.io.recording.source_files import recording_files
 from stseg.io.recording.video.ffmpeg import read_frame_rate, read_video_size
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.values import require_within
 
 Distance = tuple[str, float, float, float, float, float]
 """A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""
 _UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
+_DELAYS = (0.0, 3600.0)
+"""Greatest delays that can be looked for, seconds."""
 _RATE_MARGIN = 0.1
 """Least log-ratio of two frame rates that counts as a difference."""
 
@@ -118,10 +122,14 @@ def calibrate_auto(
         Where a video cannot be read, or too few people walk where several cameras see them.
     """
     output, paths, reporter = Path(output), [Path(video) for video in videos], reporter_of(progress)
+    require_within("--person-height", person_height, limits.BODY)
+    require_within("--most-delay", most_delay, _DELAYS)
+    require_within("--cell", cell, limits.CELL)
     require_output(output, overwrite, Inputs(paths))  # before videos are opened, which may be none
     if frame_rate is None:
         frame_rate = _rate_of_heads(paths)
         reporter.note(f"{frame_rate:g} frames per second by the heads of the videos (--frame-rate)")
+    require_within("--frame-rate", frame_rate, limits.FRAME_RATE)
     streams = _streams(paths, output, frame_rate, background, source_kind)
     require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
@@ -207,8 +215,6 @@ def _streams(
     names = camera_names(videos)
     if len(videos) < 2 or len(set(names)) < len(names):
         raise ConfigError("calibrate auto", "VIDEO", ", ".join(map(str, videos)), "two or more, with different names")
-    if not frame_rate > 0:
-        raise ConfigError("--frame-rate", "", frame_rate, "frames per second, above 0")
     cameras = tuple(uncalibrated_camera(name, path) for name, path in zip(names, videos, strict=True))
     sources = tuple(
         CameraSource(

@@ -165,7 +165,7 @@ def _isolated_boxes(recording: Recording, first: int, stop: int, progress: AnyRe
         open_frames(recording.without_images(), first, None) as frame_sets,
         reporter_of(progress).progress("looking", stop - first) as advance,
     ):
-        for frame_set, _ in zip(frame_sets, range(first, stop), strict=False):
+        for _, frame_set in zip(range(first, stop), frame_sets, strict=False):
             evidence = [
                 foreground.evidence(view) for foreground, view in zip(foregrounds, frame_set.views, strict=True)
             ]
