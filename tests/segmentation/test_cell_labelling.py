@@ -96,13 +96,9 @@ def test_shares_by_definition(x: float, y: float, height: float, spread: float, 
     assert (share[1] == 0) == gone or share[1] < 2e-3
 
 
-def share_at(places: PredictedPlaces, *cells: tuple[float, float, float]) -> Floats:
-    x, y, z = np.array(cells).T
-    return track_shares(np.zeros(len(cells), np.int64), np.column_stack([x, y]), z, places, BODY)
-
-
 def test_costs_of_labels_by_gate_in_quanta() -> None:
-    share = share_at(places_at((0.5, 0.7), (1.9, 0.7)), (0.5, 0.7, 1.0), (1.9, 0.8, 1.0), (1.2, 0.0, 1.0))
+    ground = np.array([[0.5, 0.7], [1.9, 0.8], [1.2, 0.0]])
+    share = track_shares(np.zeros(3, np.int64), ground, np.ones(3), places_at((0.5, 0.7), (1.9, 0.7)), BODY)
     assert (share > 0).tolist() == [[True, False, True], [False, True, True], [False, False, True]]
     assert share[2, -1] == 1.0 and share[0, 0] > 0.95
     subgraph = CellSubset(np.array([3, 5]), np.array([0]), np.array([1]), np.array([7]), np.array([2, 0]))

@@ -79,23 +79,15 @@ def test_tracks_keep_names_over_seams_and_of_the_longest() -> None:
     assert rows["id"][-1] == 1
 
 
-@pytest.mark.parametrize(
-    ("first", "later", "told"),
-    [
-        ((standing(1, range(20), 0.0), events()), (standing(1, range(18, 40), 3.0), events()), (19, 20)),
-        # What a segment says itself is not told again.
-        (
-            (standing(1, range(19), 0.0), events((18, "death", 1, 0))),
-            (standing(1, range(21, 40), 3.0), events((21, "birth", 1, 0))),
-            (18, 21),
-        ),
-    ],
-    ids=["unclaimed", "told"],
-)
-def test_seams_of_unclaimed_tracks(first: tuple[Rows, Rows], later: tuple[Rows, Rows], told: tuple[int, int]) -> None:
-    rows, events_told = stitched(first, later)
+@pytest.mark.parametrize(("stop", "begin", "is_told"), [(20, 18, False), (19, 21, True)])
+def test_seams_of_unclaimed_tracks(stop: int, begin: int, is_told: bool) -> None:
+    """What a segment says itself is not told again."""
+    told = [(stop - 1, "death", 1, 0)], [(begin, "birth", 1, 0)]
+    died, born = (events(*own) if is_told else events() for own in told)
+    rows, found = stitched((standing(1, range(stop), 0.0), died), (standing(1, range(begin, 40), 3.0), born))
+    ended = [(stop - 1, b"death", 1), (max(begin, stop), b"birth", 2)]
+    assert [(e["frame"], e["kind"], e["id"]) for e in found] == ended
     assert np.unique(rows["id"]).tolist() == [1, 2]
-    assert [(e["frame"], e["kind"], e["id"]) for e in events_told] == [(told[0], b"death", 1), (told[1], b"birth", 2)]
 
 
 @drawn(
