@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.terminal.standard_error import TerminalReporter
+from stseg.commands.terminal.standard_error import TerminalReporter, warn
 from stseg.errors import ConfigError
 from stseg.io.detections.source_detections import read_source
 from stseg.tasks import detection
@@ -57,9 +57,13 @@ def detect(
     recording = detection.detect(
         rig, output, model=model, features=features, classes=class_, score=score, overwrite=overwrite, progress=reporter
     )
+    number = 0
     for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True):
         if feed.source.path.parent == recording.path.parent:
             found = read_source(feed.source, camera.size)
+            number += len(found.kept)
             numbers = "" if found.kept.features is None else f", {found.kept.features.shape[1]} features each"
             print(f"{feed.source.path}: {len(found.kept)} boxes, {len(found.kept) / found.frames:.1f} a frame{numbers}")
+    if not number:
+        warn(["no box was found: are the model's outputs those of a detector, and --class and --score right?"])
     print(f"wrote {recording.path}; next: stseg run {recording.path} -o run.h5")

@@ -67,12 +67,23 @@ def evaluate(
     asked_area = None if area is None else area_of(area)
     rows, trajectory = read_tracks_csv(truth), _read(tracks)
     scores = score(rows, trajectory, gate, asked_area, asked_frames, ignore_flagged, align)
-    if 2 * scores.hits < scores.truths and (advice := reading_advice(rows, trajectory, gate)):
+    if 2 * scores.hits < max(scores.truths, 1) and (advice := _advice(scores, rows, trajectory)):
         warn([advice])
     if as_json:
         print(json.dumps(scores.as_dict(), indent=1))
     else:
         output_console().print(_table(scores))
+
+
+def _advice(scores: Scores, truth: Rows, trajectory: Rows) -> str | None:
+    """The probable cause where tracks meet less than half of the truth; None where none is seen."""
+    if not scores.truths:
+        return "no row of the truth is evaluated: has it such frames (--frames), and people there (--area)?"
+    first, last = (int(edge(trajectory["frame"])) for edge in (np.min, np.max)) if len(trajectory) else (0, -1)
+    within = int(((truth["frame"] >= first) & (truth["frame"] <= last)).sum())
+    if within < len(truth) and 2 * scores.hits >= within > 0:
+        return f"the tracks have the frames {first} to {last} alone, the truth others: give --frames {first}:{last + 1}"
+    return reading_advice(truth, trajectory, scores.gate)
 
 
 def _read(tracks: Path) -> Rows:

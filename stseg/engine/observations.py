@@ -43,7 +43,8 @@ def as_observation(view: Any, camera: Camera, place: str, classes: Sequence[int]
     if array.ndim == 2 and array.shape[1] in (4, 5) and array.shape != shape:
         return as_boxes(array, where)
     if (array.dtype, array.ndim) not in _PICTURES or array.shape[:2] != shape or array.shape[2:] not in ((), (3,)):
-        expected = f"an image, mask or likelihood of {shape[0]} rows and {shape[1]} columns, or boxes (n, 4 or 5)"
+        size = f"{shape[0]} rows and {shape[1]} columns"
+        expected = f"an image or mask in uint8, or a likelihood, of {size}, or boxes (n, 4 or 5)"
         raise SourceError(where, "", f"an array of {array.dtype} {array.shape}", expected)
     return as_likelihood(array, where) if array.dtype.kind == "f" else array
 

@@ -34,6 +34,8 @@ def write_slice(run: Run, text: str, output: Path, overwrite: bool) -> str:
     OutputError
     """
     require_output(output, overwrite, Inputs(run.files))
+    if run.kept == "none":
+        raise ConfigError("command line", "--slice", "a run that keeps no volume", "one made without --volume none")
     wanted = _parse(text)
     frame = _frame(run, wanted, text)
     grid, (log_odds, label) = run.recording.rig.grid, run.read_frame(frame)

@@ -7,6 +7,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Rows
 from stseg.errors import InputError
 from stseg.io.config_file import parse_config
+from stseg.io.recording.frames import read_camera
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.time_alignment import missing_images
 from stseg.io.runfile.runs import Run
@@ -24,6 +25,8 @@ _DOUBTFUL_MISSES = 0.1
 """Miss rate from which they are looked for: swaps leave 0.13 to 0.8, right views 0.03 to 0.1, in crowds more."""
 _UNLIKE = 1.4
 """Least ratio of that rate to the least one of all views or to the first guess: swaps leave 1.7 or more."""
+_SAMPLED_FRAMES = 20
+"""Frames of a run without people whose masks are looked at."""
 _MOVED = 1.0
 """Least shift of an image that counts as a moved camera, pixels."""
 
@@ -61,11 +64,25 @@ def _emptiness(run: Run) -> Iterator[str]:
         dropped = int((run.events["kind"] == b"dropped").sum())
         remedy = "see /events, and tracking.minimum_duration for short recordings"
         yield f"all {dropped} tracks were dropped: {remedy}" if dropped else "no person was found"
+        if not dropped and _have_faint_masks(run):
+            yield "no mask has a value above 1: are they 0 and 1 instead of 0 and 255?"
     unseen = ground_by_views(run.views, run.recording.rig.grid.inside(), len(run.cameras))[0]
     if not run.views.any():
         yield "no view sees any cell"
     elif unseen > _BLIND_SHARE:
         yield f"no view sees {100 * unseen:.0f} % of the ground"
+
+
+def _have_faint_masks(run: Run) -> bool:
+    """Whether masks that still exist are 0 or 1 in some frames of a run, and not all 0."""
+    masks = [k for k, feed in enumerate(run.recording.sources) if feed.source.kind == "masks"]
+    some, most = run.frames[:: len(run.frames) // _SAMPLED_FRAMES + 1].tolist(), 0.0
+    try:
+        for view in (view for k in masks for view in read_camera(run.recording, k, some)):
+            most = max(most, float(np.max(view, initial=0))) if isinstance(view, np.ndarray) else most
+    except InputError:
+        return False
+    return 0 < most <= 1
 
 
 def _are_misses_doubtful(run: Run, guess: float) -> bool:

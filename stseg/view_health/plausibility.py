@@ -29,8 +29,10 @@ _RATES = (0.2, 250.0)
 """Usual frame rates, frames per second."""
 _FARTHEST = 150.0
 """Greatest height of a camera above the ground, metres."""
-_LOWEST_TOP = 0.6
-"""Least height of the uppermost plane, in mean heights of a body."""
+_LOWEST_TOP, _HIGHEST_TOP = 0.6, 5.0
+"""Heights of the uppermost plane that are no mistake, heights of a body."""
+_LARGEST_CELL = 0.35
+"""Side of a cell beyond which it is wider than a body, heights of that."""
 
 
 def scene_warnings(rig: Rig, height: float) -> list[str]:
@@ -38,8 +40,10 @@ def scene_warnings(rig: Rig, height: float) -> list[str]:
     warnings = []
     if len(rig.cameras) == 1:
         warnings.append("one camera alone: no other view confirms or denies what it shows")
-    if rig.grid.top < _LOWEST_TOP * height:
+    if not _LOWEST_TOP * height <= rig.grid.top <= _HIGHEST_TOP * height:
         warnings.append(f"grid.top is {rig.grid.top:g} m, and bodies are {height:g} m tall: is it in metres?")
+    if rig.grid.cell > _LARGEST_CELL * height:
+        warnings.append(f"grid.cell is {rig.grid.cell:g} m, wider than a body: is it in metres?")
     if not _RATES[0] <= rig.frame_rate <= _RATES[1]:
         warnings.append(f"frame_rate is {rig.frame_rate:g} frames per second: is it seconds per frame, or per minute?")
     high = [camera.name for camera in rig.cameras if abs(camera.centre[2]) > _FARTHEST]

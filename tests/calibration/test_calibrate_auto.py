@@ -36,7 +36,7 @@ from stseg.errors import ConfigError, SourceError
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
 from stseg.simulation.rendering.room import render_room
-from stseg.tasks.calibration.automatic import _require_ground, frame_rate_notes
+from stseg.tasks.calibration.automatic import _require_plausible, frame_rate_notes
 
 IMAGE = (480, 360)
 
@@ -184,7 +184,8 @@ def test_known_distances_fix_scale_uncertainties_and_grid(solution: SolvedViews)
         np.testing.assert_allclose(missed, solution.adjustment.residual, atol=2e-3)
     pixel = np.array([[150.0, 250.0], [300.0, 260.0]])
     known = [KnownDistance(1, pixel, 3.0)]
-    refused(ConfigError, "a pixel that shows no ground", _require_ground, solution, [KnownDistance(1, -9 * pixel, 3.0)])
+    refused(ConfigError, "shows no ground", _require_plausible, solution, [KnownDistance(1, -9 * pixel, 3.0)])
+    refused(ConfigError, "makes people .* m tall", _require_plausible, solution, [KnownDistance(1, pixel, 300.0)])
     larger = adjusted_to(solution, known)
     assert measured(larger, known) == pytest.approx(3.0)
     assert scale_spread(larger, known) < 0.03 < scale_spread(solution, []) < 0.1

@@ -82,11 +82,9 @@ def test_tracks_keep_names_over_seams_and_of_the_longest() -> None:
 @pytest.mark.parametrize(("stop", "begin", "is_told"), [(20, 18, False), (19, 21, True)])
 def test_seams_of_unclaimed_tracks(stop: int, begin: int, is_told: bool) -> None:
     """What a segment says itself is not told again."""
-    told = [(stop - 1, "death", 1, 0)], [(begin, "birth", 1, 0)]
-    died, born = (events(*own) if is_told else events() for own in told)
+    died, born = (events(*[own] * is_told) for own in ((stop - 1, "death", 1, 0), (begin, "birth", 1, 0)))
     rows, found = stitched((standing(1, range(stop), 0.0), died), (standing(1, range(begin, 40), 3.0), born))
-    ended = [(stop - 1, b"death", 1), (max(begin, stop), b"birth", 2)]
-    assert [(e["frame"], e["kind"], e["id"]) for e in found] == ended
+    assert found[["frame", "kind", "id"]].tolist() == [(stop - 1, b"death", 1), (max(begin, stop), b"birth", 2)]
     assert np.unique(rows["id"]).tolist() == [1, 2]
 
 

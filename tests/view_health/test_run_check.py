@@ -274,6 +274,7 @@ def test_rigs_in_other_units_are_named(recording: Recording) -> None:
     for wrong, named in (
         (replace(rig, cameras=rig.cameras[:1]), "one camera alone"),
         (replace(rig, grid=replace(rig.grid, top=0.2)), "grid.top is 0.2 m"),
+        (replace(rig, grid=replace(rig.grid, cell=1.0)), "grid.cell is 1 m"),
         (replace(rig, frame_rate=0.01), "frame_rate is 0.01"),
         (replace(rig, frame_rate=1000.0), "frame_rate is 1000"),
         (replace(rig, cameras=tuple(centimetres)), "in centimetres"),

@@ -84,7 +84,8 @@ def scale_spread(solution: SolvedViews, known: Sequence[KnownDistance]) -> float
         scatter = _shortage(solution, known).std(ddof=1) * np.linalg.norm(weight) if len(known) > 1 else 0.0
         return float(np.hypot(ground, max(np.sqrt(weight @ covariance[1:, 1:] @ weight), scatter)))
     matched, tall = solution.problem.correspondences, np.median(parameters.points[:, 2])
-    body = np.hypot(_MEAN_HEIGHT_SPREAD, _BODY_HEIGHT_SPREAD / np.sqrt(np.bincount(matched.frame).max())) / tall
+    most = np.unique(matched.frame, return_counts=True)[1].max()
+    body = np.hypot(_MEAN_HEIGHT_SPREAD, _BODY_HEIGHT_SPREAD / np.sqrt(most)) / tall
     return float(np.sqrt(body**2 + ground**2 + covariance[0, 0]))
 
 

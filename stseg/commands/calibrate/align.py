@@ -5,7 +5,11 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from stseg.commands.terminal.standard_error import warn
 from stseg.tasks.calibration.alignment import align_rig
+
+_DOUBTFUL_MEAN = 50.0
+"""Mean distance of points from their places beyond which they are doubtful, centimetres."""
 
 
 def align(
@@ -55,3 +59,5 @@ def align(
     mean = 100 * sum(off) / len(off)
     checked = "two places fit any rig: a third would show whether they are right" if places == 2 else ""
     print(f"{output}: {len(off)} points, off by {mean:.1f} cm on the average" + (f"; {checked}" if checked else ""))
+    if mean > _DOUBTFUL_MEAN:
+        warn([f"the points are off by {mean:.0f} cm on the average: is one of them wrong, or of another ground?"])

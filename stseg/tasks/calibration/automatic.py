@@ -35,6 +35,8 @@ Distance = tuple[str, float, float, float, float, float]
 _UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
+_HEIGHTS = (0.2, 2.6)
+"""Mean heights of people, or animals, that known distances may lead to, metres."""
 _DELAYS = (0.0, 3600.0)
 """Greatest delays that can be looked for, seconds."""
 _RATE_MARGIN = 0.1
@@ -133,13 +135,13 @@ def calibrate_auto(
     streams = _streams(paths, output, frame_rate, background, source_kind)
     require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
-    known = [_known_distance(distance, names) for distance in distances]
+    known = [_known_distance(distance, streams.rig.cameras) for distance in distances]
     for note in frame_rate_notes(paths, frame_rate):
         reporter.note(note)
     views, backgrounds = people_of(streams, frames, person_height, most_delay, reporter)
     with reporter.progress("calibrating", steps_of(len(names))) as advance:
         solution = calibrate_from_people([str(path) for path in paths], views, lambda: advance(1))
-    _require_ground(solution, known)
+    _require_plausible(solution, known)
     if known:
         solution = adjusted_to(solution, known)
         views = replace(views, person_height=float(np.median(solution.adjustment.parameters.points[:, 2])))
@@ -227,21 +229,28 @@ def _streams(
     return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
 
 
-def _known_distance(distance: Distance, names: Sequence[str]) -> KnownDistance:
-    camera, *pixels, metres = distance
-    found = repr(",".join([camera, *(f"{number:g}" for number in (*pixels, metres))]))
-    if camera not in names:
+def _known_distance(distance: Distance, cameras: Sequence[Camera]) -> KnownDistance:
+    name, *numbers, metres = distance
+    found, names = repr(",".join([name, *(f"{n:g}" for n in (*numbers, metres))])), [camera.name for camera in cameras]
+    if name not in names:
         raise ConfigError("--distance", "", found, f"camera,u,v,u,v,metres with a camera of {', '.join(names)}")
-    if not metres > 0 or pixels[:2] == pixels[2:]:
-        raise ConfigError("--distance", "", found, "two different pixels, and metres above 0")
-    return KnownDistance(list(names).index(camera), np.array(pixels, float).reshape(2, 2), metres)
+    index, pixels = names.index(name), np.array(numbers, float).reshape(2, 2)
+    width, height = cameras[index].size
+    if not metres > 0 or (pixels[0] == pixels[1]).all() or not ((pixels >= 0) & (pixels <= (width, height))).all():
+        expected = f"two different pixels of the image of {width}x{height}, and metres above 0"
+        raise ConfigError("--distance", "", found, expected)
+    return KnownDistance(index, pixels, metres)
 
 
-def _require_ground(solution: SolvedViews, known: Sequence[KnownDistance]) -> None:
-    """Raise ConfigError for a distance whose pixels do not show the ground."""
+def _require_plausible(solution: SolvedViews, known: Sequence[KnownDistance]) -> None:
+    """Raise ConfigError for a distance whose pixels do not show the ground, or that makes people giants or dwarfs."""
     for number, metres in enumerate(measured(solution, known), start=1):
         if not np.isfinite(metres):
             raise ConfigError("--distance", str(number), "a pixel that shows no ground", "pixels where people walk")
+    tall = float(np.median(scaled_to(solution, known).adjustment.parameters.points[:, 2])) if known else _HEIGHTS[0]
+    if not _HEIGHTS[0] <= tall <= _HEIGHTS[1]:
+        found, (least, most) = f"what makes people {tall:.2g} m tall", _HEIGHTS
+        raise ConfigError("--distance", "", found, f"metres that make them {least:g} to {most:g} m tall")
 
 
 def _frame_range(frames: FrameSpan, length: int) -> tuple[int, int]:

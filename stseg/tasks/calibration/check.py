@@ -157,7 +157,10 @@ def check_rig(rig: Path | str | Recording, *, frames: FrameSpan = None, progress
 
 
 def _isolated_boxes(recording: Recording, first: int, stop: int, progress: AnyReporter) -> dict[int, list[Floats]]:
-    """Boxes (n, 4) of people who stand alone in each view, by frame."""
+    """Boxes (n, 4) of people who stand alone in each view, by frame; none where the recording has no such frames."""
+    with open_frames(recording.without_images(), first) as frame_sets:
+        if next(frame_sets, None) is None:
+            return {}
     foregrounds = make_foregrounds(recording, Config(), first, stop)
     sizes = [camera.size for camera in recording.rig.cameras]
     boxes: dict[int, list[Floats]] = {}
