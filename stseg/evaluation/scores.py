@@ -19,7 +19,7 @@ from stseg.evaluation.clear import (
     switches,
 )
 from stseg.evaluation.hota import hota
-from stseg.evaluation.sequence import Area, Sequence, align_frames
+from stseg.evaluation.sequence import Area, Sequence, align_frames, require_tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,12 +155,13 @@ def evaluate(
     ConfigError
         Where the gate is not above 0 or the area is turned inside out.
     FormatError
-        Where a position is not finite or an id occurs twice in a frame.
+        Where one is no such table, a position is not finite, or an id occurs twice in a frame.
     """
     if not (math.isfinite(gate) and gate > 0):
         raise ConfigError("evaluation", "gate", gate, "metres, above 0")
     if area is not None and not (area[0] < area[2] and area[1] < area[3]):
         raise ConfigError("evaluation", "area", area, "x0, y0, x1, y1 in metres with x0 below x1 and y0 below y1")
+    require_tables(truth=truth, tracks=trajectory)
     motion = best_motion(truth, trajectory, gate, align)
     sequence = align_frames(truth, moved_rows(trajectory, motion), gate, area, frames, ignore_flagged)
     matches = match_per_frame(sequence, gate), match_with_continuity(sequence, gate)

@@ -188,6 +188,14 @@ def align_frames(
     return Sequence(len(listed), evaluated_frames, person_frames, track_frames)
 
 
+def require_tables(**tables: object) -> None:
+    """Raise FormatError where one is no structured array of rows on the ground."""
+    for name, table in tables.items():
+        if not isinstance(table, np.ndarray) or not {"frame", "id", "x", "y"} <= set(table.dtype.names or ()):
+            expected = "an array with the columns frame, id, x, y, as of run.trajectory or stseg.read_tracks_csv(path)"
+            raise FormatError(name, "", f"a {type(table).__name__}", expected)
+
+
 def require_rows(rows: Rows, name: str) -> None:
     """Raise FormatError where a position is not finite or an id occurs twice in a frame."""
     lost = ~np.isfinite(ground_of(rows)).all(axis=1)

@@ -146,6 +146,7 @@ def test_tables_areas_and_gates_that_cannot_be() -> None:
     lost["y"][3] = np.nan
     refused(FormatError, "tracks: frame 3, id 1: found a position that is not finite", evaluate, TWO, lost)
     refused(FormatError, "truth: frame 0: found id 1 twice", evaluate, np.concatenate([TWO, TWO[:1]]), TWO)
+    refused(FormatError, "truth: found a str, expected an array", cast(Any, evaluate), "truth.csv", TWO)
     refused(ConfigError, "area", evaluate, TWO, TWO, area=(1, 0, 0, 1))
     for gate in (0.0, -1.0, float("nan"), float("inf")):
         refused(ConfigError, "gate", evaluate, TWO, TWO, gate)

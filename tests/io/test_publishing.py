@@ -171,10 +171,9 @@ def test_missing_receivers_or_libraries_delay_nothing(monkeypatch: pytest.Monkey
     assert said[-1].startswith("30 messages were not published")
     monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
     refused(ConfigError, r"pip install 'stseg\[websocket\]'", receiver_of, "ws://127.0.0.1/")
-    for name in ("paho", "paho.mqtt", "paho.mqtt.client"):
-        monkeypatch.setitem(sys.modules, name, (client := Mock()))
+    monkeypatch.setattr("stseg.io.live.publishing.load_extra", library := Mock())
     receiver_of("mqtt://us%40r:p%40ss@h/t")
-    assert client.Client.return_value.username_pw_set.call_args.args == ("us@r", "p@ss")
+    assert library.return_value.Client.return_value.username_pw_set.call_args.args == ("us@r", "p@ss")
 
 
 BAD_ADDRESSES = (
