@@ -113,6 +113,13 @@ def parse_whole(text: str, low: int, high: int) -> int | None:
     return number if low <= number <= high else None
 
 
+def parse_pair(text: str, low: int, high: int) -> tuple[int, int] | None:
+    """Two whole numbers within [low, high] from text with a comma between them; None for anything else."""
+    one, comma, other = text.partition(",")
+    first, second = parse_whole(one, low, high), parse_whole(other, low, high)
+    return (first, second) if comma and first is not None and second is not None else None
+
+
 def parse_numbers(words: Sequence[str], largest: float = limits.NUMBER) -> list[float] | None:
     """Finite numbers no larger than `largest` in size; None where one of them is none."""
     numbers = [parse_number(word) for word in words]

@@ -71,7 +71,7 @@ def simulate(
         For a scene, kind of error or number that is none.
     """
     given = {key: value for key, value in changes.items() if value is not None}
-    for name in _BOUNDS.keys() & given.keys():
+    for name in filter(given.__contains__, _BOUNDS):
         require_within(f"--{name.replace('_', '-')}", given[name], _BOUNDS[name])
     if scene not in NAMED:
         raise ConfigError("command line", "--scene", repr(scene), one_of(scene, NAMED))

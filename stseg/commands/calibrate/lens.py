@@ -12,7 +12,7 @@ from stseg.io.calibrations.xml_files import write_opencv_lens
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
-from stseg.io.untrusted.values import abbreviated, parse_whole
+from stseg.io.untrusted.values import abbreviated, parse_pair
 from stseg.tasks.calibration.automatic import uncalibrated_camera
 
 _MOST_CORNERS = 1000
@@ -51,8 +51,8 @@ def calibrate_lens(
         Replace the file if it exists.
     """
     require_output(output, overwrite, Inputs([video]))
-    columns, rows = ([parse_whole(part, 3, _MOST_CORNERS) for part in board.split(",")] + [None, None])[:2]
-    if columns is None or rows is None or board.count(",") != 1 or every < 1:
+    corners = parse_pair(board, 3, _MOST_CORNERS)
+    if corners is None or every < 1:
         expected = f"columns,rows of inner corners, 3 or more and at most {_MOST_CORNERS}; 1 or more"
         raise ConfigError("--board, --every", "", f"{abbreviated(board)}, {every}", expected)
     camera = uncalibrated_camera(video.stem, video)
@@ -60,13 +60,13 @@ def calibrate_lens(
     found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []
     try:
         while isinstance(view := stream.read(), np.ndarray):
-            corners = find_corners(np.asarray(view, np.uint8), (columns, rows))
-            if corners is not None and all(np.abs(corners - one).mean() > _WORTH * size[0] for one in found):
-                found.append(corners)
+            seen = find_corners(np.asarray(view, np.uint8), corners)
+            if seen is not None and all(np.abs(seen - one).mean() > _WORTH * size[0] for one in found):
+                found.append(seen)
             stream.skip(every - 1)
     finally:
         stream.close()
-    fit = fit_lens(str(video), found, (columns, rows), size)
+    fit = fit_lens(str(video), found, corners, size)
     write_opencv_lens(output, fit.lens, overwrite)
     focal, (u, v) = fit.lens.matrix[0, 0], fit.lens.matrix[:2, 2]
     print(

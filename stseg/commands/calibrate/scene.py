@@ -12,7 +12,7 @@ from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.io.recording.recording import CameraSource, Source, SourceKind
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import abbreviated, parse_numbers, parse_whole
+from stseg.io.untrusted.values import abbreviated, parse_numbers, parse_pair
 
 
 @Parameter(name="*")
@@ -105,11 +105,11 @@ def _filled(pattern: str, name: str) -> Path:
 
 def size_of(text: str) -> tuple[int, int]:
     """Width and height from the command line."""
-    sides = [parse_whole(part, 1, limits.SIDE) for part in text.split(",")]
-    if len(sides) != 2 or sides[0] is None or sides[1] is None or sides[0] * sides[1] > limits.PIXELS:
+    size = parse_pair(text, 1, limits.SIDE)
+    if size is None or size[0] * size[1] > limits.PIXELS:
         expected = f"width,height in whole pixels, at most {limits.PIXELS} in all"
         raise ConfigError("command line", "--size", abbreviated(text), expected)
-    return sides[0], sides[1]
+    return size
 
 
 def area_of(text: str) -> tuple[float, float, float, float]:

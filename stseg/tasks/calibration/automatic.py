@@ -249,7 +249,7 @@ def _require_plausible(solution: SolvedViews, known: Sequence[KnownDistance]) ->
             raise ConfigError("--distance", str(number), "a pixel that shows no ground", "pixels where people walk")
     tall = float(np.median(scaled_to(solution, known).adjustment.parameters.points[:, 2])) if known else _HEIGHTS[0]
     if not _HEIGHTS[0] <= tall <= _HEIGHTS[1]:
-        found, (least, most) = f"what makes people {tall:.2g} m tall", _HEIGHTS
+        found, (least, most) = f"what makes people {tall:.3g} m tall", _HEIGHTS
         raise ConfigError("--distance", "", found, f"metres that make them {least:g} to {most:g} m tall")
 
 
