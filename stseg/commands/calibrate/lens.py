@@ -51,8 +51,8 @@ def calibrate_lens(
         Replace the file if it exists.
     """
     require_output(output, overwrite, Inputs([video]))
-    corners = parse_pair(board, 3, _MOST_CORNERS)
-    if corners is None or every < 1:
+    sides = parse_pair(board, 3, _MOST_CORNERS)
+    if sides is None or every < 1:
         expected = f"columns,rows of inner corners, 3 or more and at most {_MOST_CORNERS}; 1 or more"
         raise ConfigError("--board, --every", "", f"{abbreviated(board)}, {every}", expected)
     camera = uncalibrated_camera(video.stem, video)
@@ -60,13 +60,13 @@ def calibrate_lens(
     found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []
     try:
         while isinstance(view := stream.read(), np.ndarray):
-            seen = find_corners(np.asarray(view, np.uint8), corners)
-            if seen is not None and all(np.abs(seen - one).mean() > _WORTH * size[0] for one in found):
-                found.append(seen)
+            corners = find_corners(np.asarray(view, np.uint8), sides)
+            if corners is not None and all(np.abs(corners - one).mean() > _WORTH * size[0] for one in found):
+                found.append(corners)
             stream.skip(every - 1)
     finally:
         stream.close()
-    fit = fit_lens(str(video), found, corners, size)
+    fit = fit_lens(str(video), found, sides, size)
     write_opencv_lens(output, fit.lens, overwrite)
     focal, (u, v) = fit.lens.matrix[0, 0], fit.lens.matrix[:2, 2]
     print(
