@@ -14,7 +14,7 @@ from stseg.geometry import Camera
 from stseg.io.live.live_stream import now
 from stseg.io.outputs.whole_files import write_file
 from stseg.io.recording.recording import Source
-from stseg.io.recording.source_files import matching, numeric_order
+from stseg.io.recording.source_files import files_of_pattern, numeric_order
 from stseg.io.recording.video.video_stream import VideoStream
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
@@ -88,7 +88,7 @@ class ArrivingFiles:
         return None
 
     def _list_folder(self) -> None:
-        found = [path for path in matching(self._pattern) if path.name not in self._taken]
+        found = [path for path in files_of_pattern(self._pattern) if path.name not in self._taken]
         last = None if self._last is None else numeric_order(self._last)
         self._pending = sorted(
             (path for path in found if last is None or numeric_order(path) > last), key=numeric_order

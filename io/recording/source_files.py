@@ -55,7 +55,7 @@ def class_lists(folder: Path) -> Iterator[Path]:
         yield from (place / name for name in (*CLASS_LISTS, "data.yaml", "data.yml") if (place / name).is_file())
 
 
-def matching(pattern: Path) -> Iterator[Path]:
+def files_of_pattern(pattern: Path) -> Iterator[Path]:
     """The files of a pattern; two stars are one, not all folders within."""
     return pattern.parent.glob(re.sub(r"\*+", "*", pattern.name))
 
@@ -67,7 +67,7 @@ def _expanded(path: Path, kind: str, key: str) -> list[Path]:
     videos = kind == "video" or (kind == "masks" and not is_image_source(path.with_name(path.name.replace("*", "_"))))
     if not videos or not is_pattern(path) or path.is_file():
         return [path]
-    found = sorted(matching(path), key=numeric_order)
+    found = sorted(files_of_pattern(path), key=numeric_order)
     if not found:
         raise SourceError(path, key, "no files", "videos")
     return found
@@ -102,7 +102,7 @@ def image_paths(path: Path, key: str) -> list[Path]:
     if path.is_dir():
         found = [file for file in path.iterdir() if file.suffix.lower() in _SUFFIXES]
     elif is_pattern(path):
-        found = list(matching(path))
+        found = list(files_of_pattern(path))
     else:
         raise SourceError(path, key, "no such file or folder", "a folder or pattern of images")
     # Names that begin with a dot are made by file systems.

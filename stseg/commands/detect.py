@@ -57,13 +57,13 @@ def detect(
     recording = detection.detect(
         rig, output, model=model, features=features, classes=class_, score=score, overwrite=overwrite, progress=reporter
     )
-    number = 0
+    boxes = 0
     for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True):
         if feed.source.path.parent == recording.path.parent:
             found = read_source(feed.source, camera.size)
-            number += len(found.kept)
+            boxes += len(found.kept)
             numbers = "" if found.kept.features is None else f", {found.kept.features.shape[1]} features each"
             print(f"{feed.source.path}: {len(found.kept)} boxes, {len(found.kept) / found.frames:.1f} a frame{numbers}")
-    if not number:
+    if not boxes:
         warn(["no box was found: are the model's outputs those of a detector, and --class and --score right?"])
     print(f"wrote {recording.path}; next: stseg run {recording.path} -o run.h5")

@@ -79,10 +79,11 @@ def _advice(scores: Scores, truth: Rows, trajectory: Rows) -> str | None:
     """The probable cause where tracks meet less than half of the truth; None where none is seen."""
     if not scores.truths:
         return "no row of the truth is evaluated: has it such frames (--frames), and people there (--area)?"
-    first, last = (int(edge(trajectory["frame"])) for edge in (np.min, np.max)) if len(trajectory) else (0, -1)
-    within = int(((truth["frame"] >= first) & (truth["frame"] <= last)).sum())
-    if within < len(truth) and 2 * scores.hits >= within > 0:
-        return f"the tracks have the frames {first} to {last} alone, the truth others: give --frames {first}:{last + 1}"
+    if len(trajectory):
+        first, last = trajectory["frame"].min(), trajectory["frame"].max()
+        shared = int(((truth["frame"] >= first) & (truth["frame"] <= last)).sum())
+        if shared < len(truth) and 2 * scores.hits >= shared > 0:
+            return f"tracks are of the frames {first} to {last}, the truth of more: give --frames {first}:{last + 1}"
     return reading_advice(truth, trajectory, scores.gate)
 
 

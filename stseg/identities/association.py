@@ -63,15 +63,16 @@ class IdentityProblem:
         tracklets, tracking = isolated_tracklets(trajectory, frame_rate), config.tracking
         limits = SearchLimits(tracking.hypotheses, tracking.maximum_gap, tracking.identity_lag)
         height = trajectory["height"].astype(float)
-        model = learn_heights(height, trajectory["frame"], tracklets, frame_rate, config)
+        heights = learn_heights(height, trajectory["frame"], tracklets, frame_rate, config)
 
         def problem(learned: LearnedAppearance) -> IdentityProblem:
-            joined = SizeModel.joined([model, learned.model])
+            joined = SizeModel.joined([heights, learned.model])
             columns = [height, *learned.value.T]
             observations = observe(trajectory, columns, joined, frame_rate, border, config)
             return cls(observations, joined, config.motion, limits, frame_rate, learned.colours)
 
-        def learned() -> LearnedAppearance:
+        def draft_appearance() -> LearnedAppearance:
+            """Appearance by the identities of a draft; nothing where no detection has any."""
             appearances = row_looks(trajectory, appearance)
             if not any(np.isfinite(value[:, 0]).any() for value in appearances):
                 return LearnedAppearance.nothing(len(trajectory))
@@ -80,7 +81,7 @@ class IdentityProblem:
             drafted = -(-tracking.hypotheses // _DRAFT_DIVISOR)
             return by(problem(by(_tracklet_of(tracklets))).with_hypotheses(drafted).solve(constraints))
 
-        return problem(learned())
+        return problem(draft_appearance())
 
     def with_hypotheses(self, number: int) -> IdentityProblem:
         """The problem with another number of hypotheses."""

@@ -76,13 +76,13 @@ def _emptiness(run: Run) -> Iterator[str]:
 def _have_faint_masks(run: Run) -> bool:
     """Whether masks that still exist are 0 or 1 in the first frames of a run, and not all 0."""
     masks = [k for k, feed in enumerate(run.recording.sources) if feed.source.kind == "masks"]
-    some, most = run.frames[_SAMPLED_FRAMES].tolist(), 0.0
+    frames = run.frames[_SAMPLED_FRAMES].tolist()
     try:
-        for view in (view for k in masks for view in read_camera(run.recording, k, some)):
-            most = max(most, float(np.max(view, initial=0))) if isinstance(view, np.ndarray) else most
+        views = (view for k in masks for view in read_camera(run.recording, k, frames))
+        greatest = max((float(view.max()) for view in views if isinstance(view, np.ndarray)), default=0.0)
     except InputError:
         return False
-    return 0 < most <= 1
+    return 0 < greatest <= 1
 
 
 def _are_misses_doubtful(run: Run, guess: float) -> bool:

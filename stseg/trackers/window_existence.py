@@ -83,8 +83,8 @@ def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
         return np.concatenate([getattr(one, name) for one in people])
 
     evidence = joined("evidence") - joined("prior")
-    places = frame, joined("ground"), joined("covariance"), joined("height")
-    return WindowCandidates(len(frames), *places, evidence, np.concatenate(tracks))
+    bodies = joined("ground"), joined("covariance"), joined("height")
+    return WindowCandidates(len(frames), frame, *bodies, evidence, np.concatenate(tracks))
 
 
 def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> Ints:

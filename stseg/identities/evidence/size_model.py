@@ -29,7 +29,7 @@ _FARTHEST = 4.0
 
 
 def prior_errors(noise: float, sizes: int = 1) -> LastingError:
-    """Errors of some sizes before the recording: all of a frame's error lasts, of a standard deviation."""
+    """Errors of some sizes before the recording: all of a row's error lasts, of the standard deviation `noise`."""
     one = np.ones(sizes)
     return LastingError(0.0 * one, noise**2 * one, _PRIOR_TIME * one)
 
@@ -96,11 +96,11 @@ def measured_tracklets(size: Floats, tracklets: Sequence[Ints]) -> list[Ints]:
     return [rows for rows in measured if len(rows) >= _LEAST_FRAMES]
 
 
-def _spread(deviation: Floats, tracklets: Sequence[Ints], prior: float) -> float:
+def _spread(deviation: Floats, tracklets: Sequence[Ints], prior_spread: float) -> float:
     """Variance among people: the covariance of the first and the last third of each tracklet.
 
     Errors of the two are independent unless they last as long, so no noise has to be subtracted.
     """
     thirds = [(rows, max(len(rows) // 3, 1)) for rows in tracklets]
     total = sum(float(deviation[rows[:third]].mean() * deviation[rows[-third:]].mean()) for rows, third in thirds)
-    return max((total + _PRIOR_PEOPLE * prior**2) / (len(tracklets) + _PRIOR_PEOPLE), 0.0)
+    return max((total + _PRIOR_PEOPLE * prior_spread**2) / (len(tracklets) + _PRIOR_PEOPLE), 0.0)
