@@ -15,6 +15,8 @@ from stseg.records import tables
 
 FORMAT = "stseg-run"
 VERSION = 2
+SUFFIXES = (".h5", ".hdf5")
+"""Ends of the names of run files; other files of tracks are tables."""
 
 OCCUPANCY = "/entry/occupancy"
 PROVENANCE = "/provenance"

@@ -15,8 +15,9 @@ from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
-from stseg.evaluation.advice import reading_advice
+from stseg.evaluation.advice import delay_advice, reading_advice
 from stseg.evaluation.alignment import Alignment
+from stseg.io.runfile.layout import SUFFIXES
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.values import abbreviated, parse_whole
@@ -67,7 +68,11 @@ def evaluate(
     asked_area = None if area is None else area_of(area)
     rows, trajectory = read_tracks_csv(truth), _read(tracks)
     scores = score(rows, trajectory, gate, asked_area, asked_frames, ignore_flagged, align)
-    if 2 * scores.hits < max(scores.truths, 1) and (advice := _advice(scores, rows, trajectory)):
+    if 2 * scores.hits < max(scores.truths, 1):
+        advice = _advice(scores, rows, trajectory)
+    else:
+        advice = delay_advice(rows, trajectory, gate) if align == "none" else None
+    if advice:
         warn([advice])
     if as_json:
         print(json.dumps(scores.as_dict(), indent=1))
@@ -88,7 +93,7 @@ def _advice(scores: Scores, truth: Rows, trajectory: Rows) -> str | None:
 
 
 def _read(tracks: Path) -> Rows:
-    if tracks.suffix.lower() not in (".h5", ".hdf5"):
+    if tracks.suffix.lower() not in SUFFIXES:
         return read_tracks_csv(tracks)
     from stseg.io.runfile.runs import read_trajectory
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.terminal.standard_error import warn
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
 from stseg.io.exports.archive import ARCHIVES
@@ -56,7 +57,10 @@ def export(
     inputs = Inputs([names], *(one.files for one in (contents, *others)))
     require_output(output, overwrite, inputs, FORMATS[to].table if to in FORMATS else "")
     if names is not None:
-        contents = contents.with_names(read_names(names))
+        given = read_names(names)
+        if strange := sorted(given.keys() - set(contents.tracks["id"].tolist())):
+            warn([f"{names}: the run has no track {', '.join(map(str, strange))}"])
+        contents = contents.with_names(given)
     if to in ARCHIVES:
         _archive(to, output, [contents, *others], overwrite)
         return

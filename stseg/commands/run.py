@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from stseg.engine.workers.worker_processes import prepare_workers
 from stseg.errors import ConfigError
-from stseg.io.runfile.layout import VolumeKind
+from stseg.io.runfile.layout import SUFFIXES, VolumeKind
 
 if TYPE_CHECKING:
     from stseg.io.runfile.runs import Run
@@ -81,6 +81,8 @@ def run(
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
+    if output.suffix.lower() not in SUFFIXES and not output.is_dir():
+        raise ConfigError("-o", "", str(output), "a run file, NAME.h5; stseg export writes tracks as csv and others")
     if scheduler is None and not follow:
         prepare_workers(workers)  # they import the stages while this process does: nothing is imported before
     from stseg.commands.terminal.standard_error import TerminalReporter, warn

@@ -21,6 +21,10 @@ _UNITS = {"": 1.0, "in millimetres": 1e-3, "in centimetres": 1e-2, "in kilometre
 _AXES = {"": (1, 1), "with x negated": (-1, 1), "with y negated": (1, -1), "with x and y exchanged": (1, 1)}
 _PAIRED_ROWS = 500, 20_000
 """Rows of the truth and of the tracks that are compared in search of an offset in frames."""
+_DELAYS = range(-10, 11)
+"""Frames by which a truth is tried to be early or late."""
+_DELAYED = 0.9
+"""Distance of a delayed truth to the tracks, by that of the given one, at which the delay is named."""
 _LEAST_EXTENT = 1.0
 """Least spread of a truth that was scaled onto the tracks, gates: a truth shrunk to a point meets what stands still."""
 
@@ -44,6 +48,26 @@ def reading_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
         alien = "tracks meet hardly a row of the truth: is it of this recording, with its frames, and in metres?"
         return alien if given < _ALIEN_SHARE else None
     return f"tracks meet {100 * given:.0f} % of the truth's rows, and {100 * best:.0f} % if the truth is {words}"
+
+
+def delay_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
+    """One sentence that names the frames by which a truth that tracks meet is early or late; None where it is not.
+
+    Arguments are those of `reading_advice`. A row has the distance of the nearest track of its frame, a gate at most.
+    """
+    frame, tree = truth["frame"], cKDTree(places_by_frame(trajectory, gate))
+    truth = sampled(truth[(frame >= trajectory["frame"].min()) & (frame <= trajectory["frame"].max())])
+    mean = {}
+    for delay in sorted(_DELAYS, key=abs):
+        later = truth.copy()
+        later["frame"] += delay
+        distance, _ = tree.query(places_by_frame(later, gate), distance_upper_bound=gate)
+        mean[delay] = np.minimum(distance, gate).mean()
+    best = min(mean, key=mean.__getitem__)
+    if mean[best] >= _DELAYED * mean[0]:
+        return None
+    distances = f"{mean[best]:.2f} m instead of {mean[0]:.2f} m from the truth"
+    return f"tracks are {distances} if that is counted from frame {-best:+d}: is it late, or the video?"
 
 
 def _readings(truth: Rows, trajectory: Rows, gate: float) -> Iterator[tuple[str, Rows]]:

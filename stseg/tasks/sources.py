@@ -102,8 +102,6 @@ class SourceSummary:
         name, found, pixel = self.camera.name, self.detections, self.boxes
         if found is None or not len(pixel):
             return
-        if int(found.kept.frame.min()) == 1 and int(found.read.frame.min()) == 1:
-            yield f"{name}: its first frame with detections is 1: do its frames count from 1? (first_frame = 1)"
         outside = 1 - float(self.ground()[1].mean())
         if outside > _OUTSIDE_SHARE:
             yield (
@@ -151,11 +149,19 @@ def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary])
     paces = (words for one in feet for words in pace_warnings(rig.frame_rate, *one, body_height(recording)))
     return [
         *scene_warnings(rig, body_height(recording)),
+        *_first_frame_warnings(summaries),
         *(words for summary in summaries for words in summary.warnings()),
         *twin_warnings(names, [summary.boxes for summary in summaries]),
         *list(paces)[:1],
         *agreement_warnings(rig.cameras, feet, lambda: [one.feet(_FOOT_OF_CENTRE) for one in summaries]),
     ]
+
+
+def _first_frame_warnings(summaries: Sequence[SourceSummary]) -> Iterator[str]:
+    """One sentence where no camera has detections in frame 0, but one in frame 1."""
+    detections = (one.detections for one in summaries if one.detections is not None and len(one.boxes))
+    if min((int(one.read.frame.min()) for one in detections), default=0) == 1:
+        yield "no camera has detections in frame 0, but in frame 1: do frames count from 1? (first_frame = 1)"
 
 
 def _swapped(rig: Rig, summaries: Sequence[SourceSummary], frames: Ints) -> list[str]:

@@ -10,7 +10,7 @@ from scenes import walkers
 
 from stseg.arrays import Rows
 from stseg.commands.main import main
-from stseg.evaluation.advice import reading_advice
+from stseg.evaluation.advice import delay_advice, reading_advice
 from stseg.io.track_csv import read_tracks_csv, write_tracks_csv
 
 GATE = 0.5
@@ -46,8 +46,13 @@ def test_the_reading_that_would_match_is_named(
     assert advice is not None and re.search(f"if the truth is {named}", advice)
 
 
+def test_a_late_truth_is_named(tracks: Rows) -> None:
+    late, early = (delay_advice(moved(tracks, 1, frames=frames), tracks, GATE) for frames in (1, -3))
+    assert "from frame +1" in str(late) and "from frame -3" in str(early)
+
+
 def test_tracks_that_match_or_are_bad_get_no_advice(tracks: Rows) -> None:
-    assert reading_advice(moved(tracks, 1), tracks, GATE) is None
+    assert reading_advice(moved(tracks, 1), tracks, GATE) is None is delay_advice(moved(tracks, 1), tracks, GATE)
     assert reading_advice(tracks[:0], tracks, GATE) is None
     assert reading_advice(tracks, tracks[:0], GATE) is None
     chance, strange = np.random.default_rng(1), tracks.copy()

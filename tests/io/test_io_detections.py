@@ -281,7 +281,7 @@ def test_inspect_says_what_a_rig_delivers_and_draws_it(
     inspect(rig, output=tmp_path / "pictures")
     printed = capsys.readouterr().out
     assert "Ultralytics text" in printed and "person 3, car 2" in printed
-    assert "do its frames count from 1? (first_frame = 1)" in printed
+    assert "do frames count from 1? (first_frame = 1)" in printed
     assert (tmp_path / "pictures" / "cam1.png").stat().st_size > 1000
     (tmp_path / "labels" / "walk_1.txt").write_text("0 0.5\n")
     refused(FormatError, r"walk_1\.txt, line 1", inspect, rig)
