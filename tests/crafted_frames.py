@@ -7,8 +7,10 @@ import numpy as np
 import reference_core as reference
 
 from stseg.arrays import Floats, Ints
-from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters
+from stseg.detection.evidence.overlap import overlaps_of
+from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters, no_rows
 from stseg.detection.score.moves import fill_gains
+from stseg.detection.score.neighbours import neighbours_of
 from stseg.detection.search.best_set import ENUMERATION_LIMIT, GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import COMPILED
 
@@ -32,9 +34,11 @@ class CraftedFrame:
 
     def problem(self) -> DetectionProblem:
         """The frame as the kernels read it."""
+        pixels, neighbours = self.pixels, neighbours_of(self.ground, self.breadth, PARAMETERS)
         return DetectionProblem(
-            self.boxes, self.pixels, self.size_prior, self.birth_cost, self.track_gain, self.ground, self.breadth,
-            PARAMETERS, np.full((len(self.pixels.raster), self.pixels.raster[0].size), -1, np.int16),
+            self.boxes, pixels._replace(overlapping=overlaps_of(pixels.first, pixels.spans, no_rows(), 0)),
+            self.size_prior, self.birth_cost, self.track_gain, self.ground, self.breadth, neighbours,
+            PARAMETERS, np.full((len(pixels.raster), pixels.raster[0].size), -1, np.int16),
         )  # fmt: skip
 
     def score(self, members: Sequence[int] | Ints) -> float:
@@ -75,7 +79,7 @@ def random_frame(seed: int, candidates: int, tracks: int = 0) -> CraftedFrame:
     area = (stop - start).sum(-1) + rng.integers(1, 5, (views, candidates)).astype(float)
     raster = rng.normal(0.3, 1.5, (views, rows, columns)).astype(MAP_TYPE)
     spans, distance = np.stack([start, stop], -1).astype(np.int16), rng.uniform(1, 5, (views, candidates))
-    pixels = PixelEvidence(raster, np.zeros_like(raster), first, spans, area, distance)
+    pixels = PixelEvidence(raster, np.zeros_like(raster), first, spans, area, distance, no_rows())
     size_prior, ground = rng.normal(0, 0.5, candidates), rng.uniform(0, 1.2, (candidates, 2))
     birth_cost = rng.uniform(0, 5, candidates) * (tracks > 0)
     track_gain = rng.normal(-3, 4, (candidates, tracks))

@@ -14,6 +14,7 @@ from stseg.detection.evidence.candidate_evidence import ProjectedBodies, box_evi
 from stseg.detection.evidence.pixel_lattice import PixelLattice
 from stseg.detection.prior import Prior
 from stseg.detection.problem import DetectionProblem, ScoreParameters
+from stseg.detection.score.neighbours import neighbours_of
 from stseg.records.candidates import Candidates
 
 
@@ -68,12 +69,11 @@ class FrameEvidence:
         has_pixels = any(isinstance(view, PixelView) for view in self.views)  # boxes show no widths
         more, prior = pool if base is None else pool.after(len(base.ground)), self.prior
         boxes = box_evidence(self.views, self.observations, bodies, None if base is None else base.boxes)
-        pixels = pixel_evidence(self.views, self.rasters, self.scales, more)
+        pixels = pixel_evidence(self.views, self.rasters, self.scales, pool, None if base is None else base.pixels)
         size_prior = prior.log_size(more.height, more.width) if has_pixels else prior.log_height(more.height)
         birth_cost, track_gain = prior.birth_cost(more.ground), prior.track_log_ratio(more)
         breadth = np.maximum(more.width / self.parameters.common_width, 1.0) if has_pixels else np.ones(len(more))
         if base is not None:
-            pixels = base.pixels.joined_with(pixels)
             size_prior = np.concatenate([base.size_prior, size_prior])
             birth_cost = np.concatenate([base.birth_cost, birth_cost])
             track_gain = np.concatenate([base.track_gain, track_gain])
@@ -86,6 +86,7 @@ class FrameEvidence:
             track_gain=track_gain,
             ground=pool.ground,
             breadth=breadth,
+            neighbours=neighbours_of(pool.ground, breadth, self.parameters),
             parameters=self.parameters,
             owner=self.lattice.owner,
         )

@@ -104,18 +104,9 @@ class PixelEvidence(NamedTuple):
     """float64 (view, candidate): pixels of the whole outline, those outside the raster included."""
     distance: Floats
     """float64 (view, candidate): distance from the camera on the ground, metres."""
-
-    def joined_with(self, other: PixelEvidence) -> PixelEvidence:
-        """The evidence for these candidates, then for those of the other, by the same pixels."""
-        views, number = self.first.shape
-        total, tall = number + other.first.shape[1], max(self.spans.shape[2], other.spans.shape[2])
-        spans = np.zeros((views, total, tall, 2), np.int16)
-        spans[:, :number, : self.spans.shape[2]] = self.spans
-        spans[:, number:, : other.spans.shape[2]] = other.spans
-        first = np.concatenate([self.first, other.first], 1)
-        area = np.concatenate([self.area, other.area], 1)
-        distance = np.concatenate([self.distance, other.distance], 1)
-        return PixelEvidence(self.raster, self.scale, first, spans, area, distance)
+    overlapping: RaggedArray
+    """The others whose outlines share a pixel with each candidate's, rising; the row of a candidate in a view is view *
+    candidates + candidate."""
 
 
 class DetectionProblem(NamedTuple):
@@ -137,6 +128,8 @@ class DetectionProblem(NamedTuple):
     breadth: Floats
     """float64 (candidate,): ratio of each body's width to a common one, at least 1: wider bodies need more room. 1
     without pixels."""
+    neighbours: RaggedArray
+    """The others within the distance of replacements or of crowding, rising, with the cost of the pair, nats."""
     parameters: ScoreParameters
     """Constants of the score."""
     owner: PixelAssignment

@@ -11,6 +11,7 @@ from stseg.arrays import Floats, Singles
 from stseg.bodies.box_fit import fill_inside, fill_match
 from stseg.bodies.views import BoxView, PixelView, View, ViewObservations
 from stseg.detection.evidence.occlusion import hiders_of
+from stseg.detection.evidence.overlap import overlaps_of
 from stseg.detection.problem import BoxEvidence, PixelEvidence, no_rows
 from stseg.records.candidates import Candidates
 
@@ -107,16 +108,28 @@ def stacked_rasters(views: Sequence[View], of_views: Sequence[Singles | None]) -
     return rasters
 
 
-def pixel_evidence(views: Sequence[View], rasters: Singles, scales: Singles, pool: Candidates) -> PixelEvidence:
-    """Evidence of all views that deliver pixels, by `stacked_rasters` of their log-odds and scales."""
+def pixel_evidence(
+    views: Sequence[View], rasters: Singles, scales: Singles, pool: Candidates, base: PixelEvidence | None = None
+) -> PixelEvidence:
+    """Evidence of all views that deliver pixels, by `stacked_rasters` of their log-odds and scales.
+
+    `base` is that of the first candidates, where it was found before: the others alone are drawn.
+    """
     chosen = [view for view in views if isinstance(view, PixelView)]
-    drawn = [view.whole_outlines(pool.ground, pool.height, pool.width) for view in chosen]
-    tall, n = max((spans.shape[1] for _, spans, _ in drawn), default=0), len(pool)
-    first, spans = np.empty((len(chosen), n), np.int64), np.zeros((len(chosen), n, tall, 2), np.int16)
-    area, order = np.empty((len(chosen), n)), np.empty((len(chosen), n))
+    number = 0 if base is None else base.first.shape[1]
+    more, shape = pool.after(number), (len(chosen), len(pool))
+    drawn = [view.whole_outlines(more.ground, more.height, more.width) for view in chosen]
+    tall = max((outline.shape[1] for _, outline, _ in drawn), default=0)
+    tall = tall if base is None else max(tall, base.spans.shape[2])
+    first, area, distance = np.empty(shape, np.int64), np.empty(shape), np.empty(shape)
+    spans = np.zeros((*shape, tall, 2), np.int16)
+    if base is not None:
+        first[:, :number], area[:, :number], distance[:, :number] = base.first, base.area, base.distance
+        spans[:, :number, : base.spans.shape[2]] = base.spans
     for k, (view, (row, outline, whole)) in enumerate(zip(chosen, drawn, strict=True)):
-        first[k], area[k], order[k] = row, whole, view.distance(pool.ground)
-        spans[k, :, : outline.shape[1]] = outline
+        first[k, number:], area[k, number:], distance[k, number:] = row, whole, view.distance(more.ground)
+        spans[k, number:, : outline.shape[1]] = outline
     if chosen:
-        area /= chosen[0].area_ratio(pool.ground, pool.height, pool.width)
-    return PixelEvidence(rasters, scales, first, spans, area, order)
+        area[:, number:] /= chosen[0].area_ratio(more.ground, more.height, more.width)
+    overlapping = overlaps_of(first, spans, no_rows() if base is None else base.overlapping, number)
+    return PixelEvidence(rasters, scales, first, spans, area, distance, overlapping)

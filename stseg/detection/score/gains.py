@@ -25,13 +25,14 @@ def gain(i: int, absent: int, state: SetState) -> float:
         return float(state.gains[whole])
     state.remaining[0] -= 1
     total = problem.parameters.prior_log_odds + problem.size_prior[i] - problem.birth_cost[i]
-    for k in range(state.neighbours.start[i], state.neighbours.start[i + 1]):
-        total -= state.neighbours.value[k] if state.inside[state.neighbours.item[k]] else 0.0
+    neighbours = problem.neighbours
+    for k in range(neighbours.start[i], neighbours.start[i + 1]):
+        total -= neighbours.value[k] if state.inside[neighbours.item[k]] else 0.0
     pixel_sum = 0.0
     for view in range(views):
         row = view * candidates + i
         known = boxes.views * candidates + row
-        is_kept = absent < 0 or not overlaps(row, absent, pixels.overlapping)
+        is_kept = absent < 0 or not overlaps(row, absent, pixels.evidence.overlapping)
         if is_kept and state.is_known[known]:
             pixel_sum += state.gains[known]
             continue

@@ -57,15 +57,16 @@ def withdraw(place: int, state: SetState) -> int:
 @kernel
 def _forget(i: int, state: SetState) -> None:
     """Forget the gains that depend on whether candidate i, outside now, is in the set."""
-    candidates, boxes, overlapping, tracks = len(state.inside), state.boxes, state.pixels.overlapping, state.tracks
+    candidates, boxes, pixels, tracks = len(state.inside), state.boxes, state.pixels.evidence, state.tracks
     state.moves[0] += 1
-    whole = boxes.views + len(state.pixels.evidence.raster)
+    whole = boxes.views + len(pixels.raster)
     _forget_part(whole, i, state)
-    for k in range(state.neighbours.start[i], state.neighbours.start[i + 1]):
-        if state.neighbours.value[k] > 0:
-            _forget_part(whole, state.neighbours.item[k], state)
-    for row in range(i, len(overlapping.start) - 1, candidates):
-        _forget_row(boxes.views + row // candidates, row, overlapping, state)
+    neighbours = state.problem.neighbours
+    for k in range(neighbours.start[i], neighbours.start[i + 1]):
+        if neighbours.value[k] > 0:
+            _forget_part(whole, neighbours.item[k], state)
+    for row in range(i, len(pixels.overlapping.start) - 1, candidates):
+        _forget_row(boxes.views + row // candidates, row, pixels.overlapping, state)
     for r in range(linked_tracks(i, state.inside, tracks)):
         _forget_row(whole, tracks.reached[r], tracks.followers, state)
     for view in range(boxes.views):

@@ -5,8 +5,6 @@ Candidates whose outlines share no pixel in a view have nothing to do with each 
 
 from typing import NamedTuple
 
-import numpy as np
-
 from stseg.arrays import Flags
 from stseg.detection.problem import PixelAssignment, PixelEvidence, RaggedArray
 from stseg.kernels.accelerate import kernel, part
@@ -19,37 +17,6 @@ class PixelState(NamedTuple):
     """The pixels, and the candidates' outlines."""
     owner: PixelAssignment
     """The set's assignment of pixels, -1 for none."""
-    overlapping: RaggedArray
-    """The others whose outlines share a pixel, rising; the row of a candidate in a view is view * candidates +
-    candidate."""
-
-
-@kernel
-def pixel_state(pixels: PixelEvidence, owner: PixelAssignment) -> PixelState:
-    """The outlines of all candidates, and the assignment of pixels to none."""
-    (views, candidates), most = pixels.first.shape, pixels.spans.shape[2]
-    start, number, nothing = np.zeros(views * candidates + 1, np.int64), 0, np.empty(0)
-    item = np.empty(views * candidates * candidates, np.int64)  # what is not filled takes no memory
-    left, right = np.empty((2, candidates), np.int64)
-    for view in range(views):
-        first, spans = pixels.first[view], pixels.spans[view]
-        for i in range(candidates):
-            left[i], right[i] = pixels.raster.shape[2], 0
-            for row in range(most if first[i] >= 0 else 0):
-                if spans[i, row, 0] < spans[i, row, 1]:
-                    left[i], right[i] = min(left[i], spans[i, row, 0]), max(right[i], spans[i, row, 1])
-        for i in range(candidates):
-            for j in range(candidates):
-                if i == j or max(left[i], left[j]) >= min(right[i], right[j]):
-                    continue
-                for row in range(max(first[i], first[j]), min(first[i], first[j]) + most):
-                    a, b = spans[i, row - first[i]], spans[j, row - first[j]]
-                    if max(a[0], b[0]) < min(a[1], b[1]):
-                        item[number] = j
-                        number += 1
-                        break
-            start[view * candidates + i + 1] = number
-    return PixelState(pixels, owner, RaggedArray(start, item[:number].copy(), nothing))
 
 
 @part
@@ -91,7 +58,7 @@ def assign_in_view(view: int, i: int, state: PixelState) -> None:
 @kernel
 def reassign_pixels(view: int, i: int, inside: Flags, state: PixelState) -> None:
     """Reassign candidate i's pixels of a view to the nearest other member, inside (candidate,), that covers each."""
-    pixels, owner, overlapping = state.evidence, state.owner[view], state.overlapping
+    pixels, owner, overlapping = state.evidence, state.owner[view], state.evidence.overlapping
     first, spans, distance = pixels.first[view], pixels.spans[view], pixels.distance[view]
     rows, row = _rows(view, i, state), view * len(inside) + i
     for k in range(rows):

@@ -22,7 +22,7 @@ process of marked points). Narrow ones get no nearer for it: the remains of a si
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.detection.problem import DetectionProblem, ScoreParameters
+from stseg.detection.problem import ScoreParameters
 from stseg.kernels.accelerate import part
 
 CORE_MARGIN = 0.05
@@ -38,22 +38,21 @@ _ROUNDING_RATIO = 1.0 + 1e-9
 
 
 @part
-def contact_limit(problem: DetectionProblem) -> float:
+def contact_limit(breadth: Floats, parameters: ScoreParameters) -> float:
     """A distance beyond which no pair costs anything, metres."""
     widest = 0.0
-    for i in range(len(problem.breadth)):
-        widest = max(widest, problem.breadth[i])
-    return float(_ROUNDING_RATIO * problem.parameters.minimum_distance * widest)
+    for i in range(len(breadth)):
+        widest = max(widest, breadth[i])
+    return float(_ROUNDING_RATIO * parameters.minimum_distance * widest)
 
 
 @part
-def pair_cost(i: int, j: int, problem: DetectionProblem) -> float:
+def pair_cost(i: int, j: int, ground: Floats, breadth: Floats, parameters: ScoreParameters) -> float:
     """Cost of one pair, nats."""
-    parameters = problem.parameters
-    contact = 0.5 * _ROUNDING_RATIO * parameters.minimum_distance * (problem.breadth[i] + problem.breadth[j])
-    if abs(problem.ground[i, 0] - problem.ground[j, 0]) > contact:  # most pairs are decided here
+    contact = 0.5 * _ROUNDING_RATIO * parameters.minimum_distance * (breadth[i] + breadth[j])
+    if abs(ground[i, 0] - ground[j, 0]) > contact:  # most pairs are decided here
         return 0.0
-    distance = body_distance(i, j, problem.ground, problem.breadth)
+    distance = body_distance(i, j, ground, breadth)
     if distance >= parameters.minimum_distance:
         return 0.0
     if distance < parameters.hard_core:

@@ -10,17 +10,14 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.detection.problem import DetectionProblem, RaggedArray
+from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.box_state import BoxState, box_state
-from stseg.detection.score.pixel_state import PixelState, pixel_state
-from stseg.detection.score.scoring import contact_limit, pair_cost
+from stseg.detection.score.pixel_state import PixelState
 from stseg.detection.score.track_state import TrackAssignment, track_state
 from stseg.kernels.accelerate import kernel
 
 NO_MEMBER = cast("int", np.int64(-1))
 """In place of a member. For -1 as it is numba would compile kernels anew, as for a type of its own."""
-REPLACEMENT_DISTANCE = 0.7
-"""A member is replaced by candidates at most this far away, metres: more is another person."""
 
 
 class Kept(NamedTuple):
@@ -36,8 +33,6 @@ class SetState(NamedTuple):
 
     problem: DetectionProblem
     """The candidates; `owner` is in use until `stseg.detection.score.moves.release`."""
-    neighbours: RaggedArray
-    """The others within the distance of replacements or of crowding, rising, with the cost of the pair, nats."""
     pixels: PixelState
     """Outlines of the candidates, and the assignment of pixels to the set."""
     boxes: BoxState
@@ -81,8 +76,7 @@ def set_state(problem: DetectionProblem) -> SetState:
     kept = Kept(numbers, np.zeros(parts + 1), np.zeros(candidates + parts, np.bool_))
     return SetState(
         problem,
-        _neighbours(problem),
-        pixel_state(problem.pixels, problem.owner),
+        PixelState(problem.pixels, problem.owner),
         boxes,
         tracks,
         numbers[: candidates + 1],
@@ -97,22 +91,3 @@ def set_state(problem: DetectionProblem) -> SetState:
         kept.flags[candidates:],
         kept,
     )
-
-
-@kernel
-def _neighbours(problem: DetectionProblem) -> RaggedArray:
-    ground, candidates = problem.ground, len(problem.ground)
-    start, number = np.zeros(candidates + 1, np.int64), 0
-    item, value = np.empty(candidates * candidates, np.int64), np.empty(candidates * candidates)
-    reach = max(REPLACEMENT_DISTANCE, contact_limit(problem))
-    for i in range(candidates):
-        for j in range(candidates):
-            if max(abs(ground[i, 0] - ground[j, 0]), abs(ground[i, 1] - ground[j, 1])) > reach:
-                continue
-            cost = pair_cost(i, j, problem)
-            distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
-            if i != j and (cost > 0 or distance <= REPLACEMENT_DISTANCE):
-                item[number], value[number] = j, cost
-                number += 1
-        start[i + 1] = number
-    return RaggedArray(start, item[:number].copy(), value[:number].copy())

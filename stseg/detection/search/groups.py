@@ -37,13 +37,13 @@ def fill_groups(state: SetState, group: Ints) -> int:
 @kernel
 def mark_interacting(i: int, state: SetState, linked: Flags) -> None:
     """Fill linked (candidate,): whether the gain of candidate i depends on each; on itself, too."""
-    boxes, tracks, neighbours, candidates = state.boxes, state.tracks, state.neighbours, len(linked)
+    boxes, tracks, neighbours, candidates = state.boxes, state.tracks, state.problem.neighbours, len(linked)
     for j in range(candidates):
         linked[j] = j == i
     for k in range(neighbours.start[i], neighbours.start[i + 1]):
         if neighbours.value[k] > 0:
             linked[neighbours.item[k]] = True
-    overlapping = state.pixels.overlapping
+    overlapping = state.pixels.evidence.overlapping
     for row in range(i, len(overlapping.start) - 1, candidates):
         _mark_row(row, overlapping, linked)
     for k in range(tracks.gains.start[i], tracks.gains.start[i + 1]):

@@ -11,7 +11,8 @@ from stseg.arrays import Flags, Ints
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.gains import gain
 from stseg.detection.score.moves import add, copy_of, put, remove, return_to, withdraw
-from stseg.detection.score.set_state import NO_MEMBER, REPLACEMENT_DISTANCE, SetState
+from stseg.detection.score.neighbours import REPLACEMENT_DISTANCE
+from stseg.detection.score.set_state import NO_MEMBER, SetState
 from stseg.detection.search.groups import mark_interacting
 from stseg.kernels.accelerate import kernel, part
 
@@ -152,7 +153,7 @@ def _replace(in_group: Flags, state: SetState) -> None:
 
     Where no gain of them has changed since none did, that is not tried again.
     """
-    neighbours = state.neighbours
+    neighbours = state.problem.neighbours
     for a in range(state.size[0] if state.remaining[0] > 0 else 0):
         member, is_open = state.members[a], False
         for k in range(neighbours.start[member], neighbours.start[member + 1]):
