@@ -144,11 +144,11 @@ def fill_gains(
         add(i, state.size[0], state)
     for k in range(len(candidates)):
         i, place, is_member = candidates[k], 0, state.inside[candidates[k]]
-        gains[k] = gain(i, NO_MEMBER, state)
         while is_member and state.members[place] != i:
             place += 1
         if is_member:
             withdraw(place, state)
+        gains[k] = gain(i, NO_MEMBER, state)
         tracks[k] = fill_evidence(i, state, view_evidence[:, k], boxes[:, k])
         if is_member:
             put(i, place, state)

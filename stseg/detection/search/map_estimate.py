@@ -11,12 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Shorts
+from stseg.arrays import Flags, Floats, Ints, Shorts
 from stseg.bodies.outlines import paint_outlines
 from stseg.bodies.views import BoxView, PixelView
 from stseg.detection.evidence.candidate_evidence import ProjectedBodies
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.detection.problem import DetectionProblem
+from stseg.detection.score.exchanges import fill_rises
 from stseg.detection.score.moves import fill_gains
 from stseg.detection.search.best_set import GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import kernel
@@ -117,6 +118,12 @@ class MapEstimate:
         pixels_last = np.argsort([isinstance(view, PixelView) for view in self.evidence.views], kind="stable")
         order = np.argsort(pixels_last)  # the problem has the views with boxes first
         return Additions(total, gains, evidence[order], tracks, box[order])
+
+    def rises(self, leaving: Flags, joining: Ints) -> Floats:
+        """Rise of the score by each exchange, float64 (k,), nats: see `stseg.detection.score.exchanges`."""
+        rises = np.empty(len(joining))
+        fill_rises(self.members, leaving, joining, self.problem, rises)
+        return rises
 
     @cached_property
     def others(self) -> Ints:

@@ -5,7 +5,7 @@ Adding, removing or replacing one person does not lead back: the two hold each o
 measured without them. So close members are also tried as one, measured with all that they explain together.
 """
 
-from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,19 +30,42 @@ def merged(estimate: MapEstimate) -> MapEstimate:
     absorbing = np.flatnonzero(is_close[separate].any(1))
     in_place = refined_members(estimate.with_members(estimate.members[separate]), absorbing).pool
     centred = refined_members(_centred(estimate, is_close, separate), absorbing).pool
-    first = len(estimate.pool)
-    best = estimate.with_more(in_place.joined_with(centred))
-    for k, a in enumerate(separate[absorbing]):
-        bodies = (first + k, first + len(absorbing) + k)
+    best, merges = estimate.with_more(in_place.joined_with(centred)), _merges(estimate, is_close, separate[absorbing])
+    while merges:
+        leaving = np.zeros((len(merges), len(best.pool)), bool)
+        for row, merge in zip(leaving, merges, strict=True):
+            row[merge.members] = True
+        bodies = np.array([merge.bodies for merge in merges])
+        rises = best.rises(np.repeat(leaving, 2, 0), bodies.ravel()).reshape(-1, 2)
+        is_better = (rises.max(1) > SCORE_TOLERANCE) & (leaving[:, best.members].sum(1) > 1)
+        if not is_better.any():
+            break
+        k = int(is_better.argmax())
+        body = bodies[k, rises[k].argmax()]
+        best = best.with_members(np.append(best.members[~leaving[k, best.members]], body))
+        merges = [merge for merge in merges[k + 1 :] if merge.bodies != merges[k].bodies]
+    return best
+
+
+class _Merge(NamedTuple):
+    """Candidates (k,) that may be one body, and two candidates for that."""
+
+    members: Ints
+    bodies: tuple[int, int]
+
+
+def _merges(estimate: MapEstimate, is_close: Flags, absorbing: Ints) -> list[_Merge]:
+    """Each absorbing member with all that are close to it, then with each of them.
+
+    The bodies come after the candidates of the estimate: one for each absorbing member, then another for each.
+    """
+    first, merges = len(estimate.pool), list[_Merge]()
+    for k, a in enumerate(absorbing.tolist()):
         others = np.flatnonzero(is_close[a])
         for absorbed in [others, *(others[[i]] for i in range(len(others) if len(others) > 1 else 0))]:
-            replaced = estimate.members[np.append(absorbed, a)]
-            rest = best.members[~np.isin(best.members, replaced)]
-            trial = max((best.with_members(np.append(rest, body)) for body in bodies), key=attrgetter("total"))
-            if len(trial.members) < len(best.members) and trial.total > best.total + SCORE_TOLERANCE:
-                best = trial
-                break
-    return best
+            bodies = first + k, first + len(absorbing) + k
+            merges.append(_Merge(estimate.members[np.append(absorbed, a)], bodies))
+    return merges
 
 
 def _centred(estimate: MapEstimate, is_close: Flags, separate: Ints) -> MapEstimate:

@@ -36,9 +36,11 @@ def moved_members(estimate: MapEstimate) -> Candidates:
 
 def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
     """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
-    chosen = np.arange(len(estimate.members)) if chosen is None else chosen
-    start, assignment = estimate.pool.at(estimate.members[chosen]), _assignment(estimate).of(chosen)
-    return _refined(estimate, start, assignment, estimate.track_index[chosen])
+    members = estimate.members if chosen is None else estimate.members[chosen]
+    score = estimate.members_score if chosen is None else estimate.additions(members)
+    number = np.arange(len(members)) if chosen is None else chosen
+    assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, number)
+    return _refined(estimate, estimate.pool.at(members), assignment, score.track_index)
 
 
 def followed_members(estimate: MapEstimate, start: Candidates) -> RefinedPeople:
