@@ -81,7 +81,7 @@ def run(
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
-    if output.suffix.lower() not in SUFFIXES and not output.is_dir():
+    if output.suffix.lower() not in SUFFIXES and not output.exists():
         raise ConfigError("-o", "", str(output), "a run file, NAME.h5; stseg export writes tracks as csv and others")
     if scheduler is None and not follow:
         prepare_workers(workers)  # they import the stages while this process does: nothing is imported before

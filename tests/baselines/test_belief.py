@@ -206,8 +206,7 @@ def test_a_round_brings_the_ground_to_the_views_if_any() -> None:
     seen = target_likelihoods([target], VIEWS, images, MOTION, FEW)
     star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
     hidden = star.views[0]
-    assert hidden is not None
-    assert star.visibility[0] < 0.2
+    assert hidden is not None and star.visibility[0] < 0.2
     np.testing.assert_allclose(VIEWS[0].to_ground(hidden.mean[None])[0], [0.2, 0.2], atol=0.15)
     np.testing.assert_allclose(star.ground.mean, [0.2, 0.2], atol=0.1)
 

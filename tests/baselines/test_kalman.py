@@ -101,8 +101,7 @@ def test_places_beyond_the_gate_or_too_late_are_somebody_new() -> None:
     assert rows["id"].tolist() == [1] * 8 + [2]
     wide = replace(CONFIG, kalman=KalmanConfig(gate_probability=1 - 1e-12))
     rows, events = follow([[(0.0, 0.0)]] * 8 + [[(0.8, 0.0)]], wide)
-    assert rows["id"].tolist() == [1] * 9
-    assert len(events) == 1
+    assert rows["id"].tolist() == [1] * 9 and len(events) == 1
     patience = round(CONFIG.kalman.patience * FRAME_RATE)
     for gap, ids in ((patience - 1, [1]), (patience, [1, 2])):
         rows, events = follow([[(0.0, 0.0)]] * 8 + [[]] * gap + [[(0.0, 0.0)]] * 3)

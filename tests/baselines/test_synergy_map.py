@@ -199,8 +199,7 @@ def test_empty_cells_are_not_occupied_in_many_views(views: int) -> None:
     pi, equal = 0.1, np.ones(views)
     false = np.nanmean(localiser.log_odds(empty, equal, [RATES] * views, pi) > 0)
     hit = np.nanmean(localiser.log_odds(bodies, equal, [RATES] * views, pi) > 0)
-    assert false < 1.2 * pi / (1 - pi)
-    assert hit > 0.6
+    assert false < 1.2 * pi / (1 - pi) and hit > 0.6
 
 
 @compiled_only
@@ -215,5 +214,4 @@ def test_cells_of_few_views_fill_under_a_mean_alone() -> None:
         mean = localiser.synergy(empty, equal, 0.05) / views
         false_mean[views] = np.mean(mean > -1.6)  # passed by half of the views
         false_u[views] = np.mean(localiser.log_odds(empty, equal, [RATES] * views, OCCUPIED) > 0)
-    assert false_mean[2] > 4 * false_mean[4] > 4 * false_mean[8]
-    assert max(false_u.values()) < 0.02
+    assert false_mean[2] > 4 * false_mean[4] > 4 * false_mean[8] and max(false_u.values()) < 0.02

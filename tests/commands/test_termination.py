@@ -127,8 +127,7 @@ def ended_by(running: subprocess.Popen[str], number: signal.Signals) -> tuple[in
     start = time.monotonic()
     running.send_signal(number)
     status = running.wait(20)
-    assert time.monotonic() - start < _SECONDS
-    assert running.stderr is not None
+    assert time.monotonic() - start < _SECONDS and running.stderr is not None
     return status, running.stderr.read().strip()
 
 

@@ -104,8 +104,7 @@ def test_features_of_boxes_go_to_the_people_whose_boxes_they_are() -> None:
     for (x, _, _), features in zip(STANDING, ([1, 2], [4, 5]), strict=True):
         of_person = rows["features"][rows["x"] == x]
         assert (of_person[:, :2] == features).all() and (of_person[:, 2:] == 0).all()
-    assert np.isnan(rows["colours"]).all()
-    assert not len(rows_of([None] * 4, likely))
+    assert np.isnan(rows["colours"]).all() and not len(rows_of([None] * 4, likely))
     assert rows["features"].shape[1] == FEATURES and rows["colours"].shape[1] == COLOURS
 
 

@@ -110,5 +110,4 @@ def test_walkers_are_followed_as_by_searches(kind: str) -> None:
         searched += is_searched(answer)
         away = np.hypot(*(answer.people.ground[:, None] - standing[:, :2]).transpose(2, 0, 1))
         assert away.shape == (3, 3) and away.min(0).max() < 0.12
-    assert len(names) == 3
-    assert 3 <= searched < 16
+    assert len(names) == 3 and 3 <= searched < 16

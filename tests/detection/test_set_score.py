@@ -9,6 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Floats, Ints
 from stseg.bodies.outlines import paint_outlines
+from stseg.detection.score.exchanges import fill_rises
 from stseg.detection.score.gains import gain
 from stseg.detection.score.moves import add, fill_gains, put, release, remove, return_to, withdraw
 from stseg.detection.score.set_state import Kept, SetState, set_state
@@ -157,6 +158,17 @@ def test_gains_are_differences_of_scores(seed: int, tracks: int) -> None:
     assert kept > 0
     release(state)
     assert (state.problem.owner == -1).all()
+
+
+@pytest.mark.parametrize("seed", range(examples(20)))
+def test_rises_of_exchanges_are_differences_of_scores(seed: int) -> None:
+    frame, rng = scaled(random_frame(seed, 8, 3)), np.random.default_rng(seed)
+    order, leaving, rises = rng.permutation(8), rng.random((6, 8)) < 0.4, np.empty(6)
+    members, joining = order[:5], rng.choice(order[5:], 6)
+    total = fill_rises(members, leaving, joining, frame.problem(), rises)
+    assert total == pytest.approx(frame.score(members) - frame.score([]), abs=1e-9)
+    after = [[*members[~left[members]], i] for left, i in zip(leaving, joining, strict=True)]
+    np.testing.assert_allclose(rises, [frame.score(one) - frame.score(members) for one in after], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(examples(20)))

@@ -324,8 +324,7 @@ def test_nothing_scores_none_costs_nothing_and_breaks_pairs() -> None:
     no_truth, no_tracks = evaluate(TWO[:0], TWO), evaluate(TWO, TWO[:0])
     assert (no_truth.frames, no_truth.moda, no_truth.mota, no_truth.recall) == (0, None, None, None)
     figures = [no_tracks.moda, no_tracks.precision, no_tracks.location_mean, no_tracks.hota, no_tracks.idf1]
-    assert figures == [0, None, None, 0, 0]
-    assert no_tracks.mostly_lost == 2
+    assert figures == [0, None, None, 0, 0] and no_tracks.mostly_lost == 2
     trajectory = table_of(TRAJECTORY, **{name: TWO[name] for name in ("frame", "id", "x", "y")})
     assert evaluate(TWO, trajectory) == evaluate(TWO, TWO)
 

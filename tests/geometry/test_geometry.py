@@ -110,16 +110,14 @@ class TestCamera:
         for lens in (None, Lens(pose.matrix, np.array(BARREL))):
             camera = Camera.from_projection("cam", (640, 480), pose.projection, lens)
             pixel, seen = camera.project(point[:2], point[2])
-            assert not seen
-            assert not camera.inside(pixel)
+            assert not seen and not camera.inside(pixel)
 
     def test_the_horizon_heights_and_edges_of_the_image(self) -> None:
         camera = Camera.from_projection("cam", (640, 480), LEVEL)
         ground = camera.back_project(np.array([[320.0, 300.0], [320.0, 200.0]]))
         assert np.isfinite(ground[0]).all() and np.isnan(ground[1]).all()
         pixel, seen = straight_down().project(np.zeros((4, 1, 2)), np.array([0.0, 1.0]))
-        assert pixel.shape == (4, 2, 2)
-        assert seen.shape == (4, 2)
+        assert pixel.shape == (4, 2, 2) and seen.shape == (4, 2)
         camera = straight_down()
         corners = np.array([[-0.5, -0.5], [643.4, 485.4], [643.5, 0.0], [0.0, 485.5], [-0.6, 0.0]])
         assert camera.inside(corners).tolist() == [True, True, False, False, False]
@@ -178,8 +176,7 @@ class TestLens:
         assert not seen
         assert camera.project(np.array([1.0, 0.0]), 0.0)[1]
         corner, middle = LENS.undistort(np.array([[0.0, 0.0], [300.0, 200.0]]))
-        assert np.isnan(corner).all()
-        assert np.isfinite(middle).all()
+        assert np.isnan(corner).all() and np.isfinite(middle).all()
         assert np.isnan(straight_down(lens=LENS).back_project(np.array([0.0, 0.0]))).all()
 
 

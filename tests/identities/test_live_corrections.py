@@ -48,8 +48,7 @@ def test_who_is_found_gets_the_first_id_back_in_time() -> None:
     found = in_windows(rows, Config(live=LiveConfig(correction_interval=2.0)), count(4).__next__)
     named = corrected_ids(rows, found)
     assert set(named["id"][rows["y"] == 0.0].tolist()) == {1}
-    assert set(named["id"][rows["y"] == 3.0].tolist()) == {3}
-    assert found["decision_frame"].min() < 80
+    assert set(named["id"][rows["y"] == 3.0].tolist()) == {3} and found["decision_frame"].min() < 80
     rows = np.concatenate([walk(1, 0, 45), walk(2, 52, 80)])
     for interval in (20.0, 0.0):
         assert len(in_windows(rows, Config(live=LiveConfig(correction_interval=interval)), count(3).__next__)) == 0

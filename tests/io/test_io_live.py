@@ -58,8 +58,7 @@ def test_files_are_taken_in_order_once_they_are_complete(tmp_path: Path) -> None
     assert [files.next(), files.next()] == [tmp_path / "cam_9.mp4", tmp_path / "cam_10.mp4"]
     assert time.monotonic() - begun < 0.3
     growing = meanwhile(partial(add_to, tmp_path / "cam_11.mp4"))
-    assert files.next() == tmp_path / "cam_11.mp4"
-    assert not growing.is_alive()
+    assert files.next() == tmp_path / "cam_11.mp4" and not growing.is_alive()
     assert time.monotonic() - begun > 0.6
     (tmp_path / "cam_8.mp4").write_bytes(b"late")
     (tmp_path / "cam_12.mp4").write_bytes(b"")
@@ -221,8 +220,7 @@ def test_broken_streams_are_reopened_and_full_queues_drop() -> None:
     assert dropped == [True] * (len(rest) - kept) + [False] * kept
     assert 5 <= kept <= 8  # what came while they were taken
     assert all((view is None) == frame_set.dropped for frame_set in rest for view in frame_set.views)
-    assert frame_sets.dropped == sum(dropped) > 3
-    assert len(reported) == 1
+    assert frame_sets.dropped == sum(dropped) > 3 and len(reported) == 1
     assert reported[0].startswith("tracking is slower than the cameras: 1 frame sets dropped so far")
 
 

@@ -123,8 +123,7 @@ def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: Captured) -> N
     rig = write_films(tmp_path, [Film(seconds), Film(seconds), started])
     run = track(rig, *SHORT, workers=2)
     said = "stseg: no camera shows anything in frames 28 to 63: a gap, at which all tracks end\n"
-    assert said in capsys.readouterr().err
-    assert run.frames.tolist() == [*range(28), *range(64, 90)]
+    assert said in capsys.readouterr().err and run.frames.tolist() == [*range(28), *range(64, 90)]
     assert presence(run) == [(0, 27)] * 3 + [(64, 89)] * 3
     assert gaps_of(run) == [(27, "gap: no camera has any of the 36 frames before frame 64")] * 3
     windows = run.windows

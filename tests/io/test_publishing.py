@@ -167,8 +167,7 @@ def test_missing_receivers_or_libraries_delay_nothing(monkeypatch: pytest.Monkey
         for frame in range(30):
             publisher.append(rows_of(frame))
         assert time.monotonic() - begun < 2
-    assert time.monotonic() - begun < 10
-    assert said[-1].startswith("30 messages were not published")
+    assert time.monotonic() - begun < 10 and said[-1].startswith("30 messages were not published")
     monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
     refused(ConfigError, r"pip install 'stseg\[websocket\]'", receiver_of, "ws://127.0.0.1/")
     monkeypatch.setattr("stseg.io.live.publishing.load_extra", library := Mock())
