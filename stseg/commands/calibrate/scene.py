@@ -37,8 +37,8 @@ class SceneOptions:
 
     @property
     def grid(self) -> Grid:
-        """The grid; bounds in the wrong order are left to the rig file's checks."""
-        x0, y0, x1, y1 = numbers("--area", self.area, "4 numbers x0,y0,x1,y1", 4)
+        """The grid."""
+        x0, y0, x1, y1 = area_of(self.area)
         corners = None
         if self.polygon is not None:
             flat = numbers("--polygon", self.polygon, "x,y of at least 3 corners")

@@ -10,9 +10,9 @@ from stseg.kernels.pointed_tuples import pointed
 
 @kernel
 def fill_rises(members: Ints, leaving: Flags, joining: Ints, problem: DetectionProblem, rises: Floats) -> float:
-    """Fill rises float64 (k,) with those of the score of the members, int64 (n,), by one exchange each: nats.
+    """Fill rises float64 (k,): by how much one exchange each raises the score of the members, int64 (n,), nats.
 
-    By exchange k the members leave that `leaving` bool (k, candidate) marks, and candidate `joining[k]` joins, int64
+    In exchange k the members leave that `leaving` bool (k, candidate) marks, and candidate `joining[k]` joins, int64
     (k,). Returns the score of the members.
     """
     whole = set_state(problem)

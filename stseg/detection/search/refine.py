@@ -45,10 +45,6 @@ class EvidenceAssignment:
         """The assignment to people who are numbered as they stand."""
         return cls(box, pixels, np.arange(box.shape[1]))
 
-    def of(self, chosen: Ints) -> EvidenceAssignment:
-        """The assignment to some of the people, int64 (k,)."""
-        return EvidenceAssignment(self.box.take(chosen, 1), self.pixels, self.number[chosen])
-
 
 @dataclass(frozen=True)
 class RefinedPlaces:
