@@ -162,8 +162,8 @@ def _replace(in_group: Flags, state: SetState) -> None:
             is_open = is_open or (newest > state.settled[member] and _may_replace(i, member, in_group, state))
         if not is_open:
             continue
-        best, best_gain = member, gain(member, NO_MEMBER, state) + SCORE_TOLERANCE
         withdraw(a, state)
+        best, best_gain = member, gain(member, NO_MEMBER, state) + SCORE_TOLERANCE
         for k in range(neighbours.start[member], neighbours.start[member + 1]):
             i = neighbours.item[k]
             if _may_replace(i, member, in_group, state):
