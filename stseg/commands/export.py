@@ -13,6 +13,7 @@ from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS, help_text, write_tracks
 from stseg.io.outputs.whole_files import Inputs, replacing, require_output
 from stseg.io.runfile.runs import Run, read_run
+from stseg.io.untrusted.values import abbreviated
 
 
 def export(
@@ -59,7 +60,7 @@ def export(
     if names is not None:
         given = read_names(names)
         if strange := sorted(given.keys() - set(contents.tracks["id"].tolist())):
-            warn([f"{names}: the run has no track {', '.join(map(str, strange))}"])
+            warn([f"{names}: names of tracks that the run has not: {abbreviated(strange)}"])
         contents = contents.with_names(given)
     if to in ARCHIVES:
         _archive(to, output, [contents, *others], overwrite)

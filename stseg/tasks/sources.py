@@ -158,10 +158,10 @@ def recording_warnings(recording: Recording, summaries: Sequence[SourceSummary])
 
 
 def _first_frame_warnings(summaries: Sequence[SourceSummary]) -> Iterator[str]:
-    """One sentence where no camera has detections in frame 0, but one in frame 1, and the rig file says no more."""
-    given = any(one.source.source.first_frame for one in summaries)
+    """One sentence where no camera has detections in frame 0, but one in frame 1, and no source gives `first_frame`."""
     detections = (one.detections for one in summaries if one.detections is not None and len(one.boxes))
-    if min((int(one.read.frame.min()) for one in detections), default=0) == 1 and not given:
+    first = min((int(one.read.frame.min()) for one in detections), default=0)
+    if first == 1 and not any(one.source.source.first_frame for one in summaries):
         yield "no camera has detections in frame 0, but in frame 1: do frames count from 1? (first_frame = 1)"
 
 

@@ -170,27 +170,27 @@ def test_answers_that_cannot_be_are_named(answer: Any, message: str) -> None:
     refused(InputError, message, solve_corrections, TWO, [Answer(*answer)])
 
 
-def test_the_command_leaves_the_run_and_names_go_through(tmp_path: Path) -> None:
+def test_the_command_leaves_the_run_and_names_go_through(tmp_path: Path, capsys: Captured) -> None:
     run = write_small_run(tmp_path / "run.h5")
     before = run.read_bytes()
     answers = tmp_path / "answers.csv"
     answers.write_text("action,frame,id,other,name\nswap,14,1,2,\nname,,2,,Bo\n")
     correct(run, answers, output=tmp_path / "new.h5")
-    assert run.read_bytes() == before
     old, new = read_run(run), read_run(tmp_path / "new.h5")
     rows = [(int(f), int(i), round(float(x), 2)) for f, i, x in new.trajectory[["frame", "id", "x"]]]
     assert (13, 1, 0.15) in rows and (14, 2, 0.15) in rows and (14, 1, 0.3) in rows and (13, 2, 0.3) in rows
-    assert new.names == {2: "Bo"} and old.names == {}
+    assert new.names == {2: "Bo"} and old.names == {} and run.read_bytes() == before
     (log_odds, label), (log_odds_before, label_before) = new.read_frame(15), old.read_frame(15)
     np.testing.assert_array_equal(log_odds, log_odds_before)
     np.testing.assert_array_equal(label, np.array([0, 2, 1])[label_before])
     with h5py.File(tmp_path / "new.h5") as file:
         assert file["provenance/answers"].asstr()[()].startswith("action,frame")
-    (tmp_path / "names.csv").write_text('id,name\n2,"Bo, the <second>"\n')
+    (tmp_path / "names.csv").write_text('id,name\n2,"Bo, the <second>"\n9,Cy\n')
     export(run, to="csv", output=tmp_path / "t.csv", names=tmp_path / "names.csv")
     lines = (tmp_path / "t.csv").read_text().splitlines()
     assert lines[0].endswith(",name") and lines[1].endswith(",") and lines[-1].endswith(',"Bo, the <second>"')
     export(run, to="geojson", output=tmp_path / "t.geojson", names=tmp_path / "names.csv")
     assert '"name": "Bo, the <second>"' in (tmp_path / "t.geojson").read_text()
+    assert "names of tracks that the run has not: [9]" in capsys.readouterr().err
     report(run, output=tmp_path / "r.html", names=tmp_path / "names.csv")
     assert "Bo, the &lt;second&gt;" in (tmp_path / "r.html").read_text()

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from stseg.arrays import Floats, Ints
 from stseg.bodies.views import BoxView
 from stseg.detection.search.body_sizes import body_sizes
@@ -36,10 +34,11 @@ def moved_members(estimate: MapEstimate) -> Candidates:
 
 def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
     """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
-    members = estimate.members if chosen is None else estimate.members[chosen]
-    score = estimate.members_score if chosen is None else estimate.additions(members)
-    number = np.arange(len(members)) if chosen is None else chosen
-    assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, number)
+    if chosen is None:
+        return _refined(estimate, estimate.pool.at(estimate.members), _assignment(estimate), estimate.track_index)
+    members = estimate.members[chosen]
+    score = estimate.additions(members)
+    assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, chosen)
     return _refined(estimate, estimate.pool.at(members), assignment, score.track_index)
 
 
