@@ -9,7 +9,7 @@ import reference_core as reference
 from stseg.arrays import Floats, Ints
 from stseg.detection.evidence.overlap import overlaps_of
 from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, ScoreParameters, no_rows
-from stseg.detection.score.moves import fill_gains
+from stseg.detection.score.moves import score_of
 from stseg.detection.score.neighbours import neighbours_of
 from stseg.detection.search.best_set import ENUMERATION_LIMIT, GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import COMPILED
@@ -42,9 +42,7 @@ class CraftedFrame:
         )  # fmt: skip
 
     def score(self, members: Sequence[int] | Ints) -> float:
-        none, nothing = np.zeros(0, np.int64), np.zeros((0, 0))
-        chosen = np.array(members, np.int64)
-        return fill_gains(chosen, none, self.problem(), np.zeros(0), nothing, nothing.astype(int), none)
+        return score_of(np.array(members, np.int64), self.problem())
 
     def best_set(
         self, start: Sequence[int] = (), sweeps: int = 4, enumeration_limit: int = ENUMERATION_LIMIT

@@ -25,7 +25,7 @@ from stseg.detection.problem import ScoreParameters
 from stseg.detection.score.scoring import CORE_MARGIN
 from stseg.detection.search.frame_search import FrameSearch
 from stseg.detection.search.map_estimate import MapEstimate
-from stseg.detection.search.restarts import better_of, has_weak_members
+from stseg.detection.search.restarts import better_of, weak_members
 from stseg.geometry import Rig
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
 from stseg.noise.box_noise_estimate import BoxNoiseEstimate
@@ -174,13 +174,13 @@ class Detector:
         evidence = self._evidence(learned.rims.applied(observations), learned.population.body, predicted)
         tracks = self._search.of_tracks(evidence)
         if not is_key and predicted is not None and proposals is None:
-            explanation = followed_frame(tracks, self.lattice_ground)
+            explanation = followed_frame(tracks, self._search)
             if explanation is not None:
                 return explanation, False
         estimate = self._search.whole(tracks, proposals)
-        if is_key and predicted is not None and not self._has_boxes and has_weak_members(estimate):
+        if is_key and predicted is not None and not self._has_boxes and len(weak_members(estimate)):
             untracked = self._evidence(evidence.observations, evidence.prior.body, None)
-            people = self._search.without_tracks(untracked)
+            people = self._search.without_tracks(untracked, estimate)
             estimate = better_of(estimate, self._search.repeated(estimate, people))
             return _with_best_alternative(estimate, untracked, people), True
         return explained_frame(estimate), True

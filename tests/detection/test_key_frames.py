@@ -63,7 +63,7 @@ def test_known_people_are_followed_to_where_a_search_finds_them(kind: str) -> No
 @pytest.mark.parametrize(
     ("standing", "predicted"),
     [
-        ((*HERE, (0.1, 1.1)), HERE),
+        ((*HERE, (0.4, 0.1)), HERE),
         (((0.0, 0.0), (0.3, 0.0)), ((0.0, 0.0), (0.3, 0.0))),
         (HERE, ((HERE[0][0] + 0.22, *HERE[0][1:]), HERE[1])),
     ],
@@ -79,6 +79,19 @@ def test_the_whole_frame_is_searched_where_something_is_open(
     assert len(answer.people) == len(standing)
     np.testing.assert_array_equal(answer.people.ground, by_search.people.ground)
     np.testing.assert_array_equal(answer.people.sizes.height, by_search.people.sizes.height)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("arrives", "step"), [((0.1, 1.1), 0.0), ((-0.2, -1.1), 0.22)])
+def test_ground_is_searched_beside_settled_people(kind: str, arrives: Sequence[float], step: float) -> None:
+    others = HERE[0], (-1.2, 1.3), (-1.3, -0.9)
+    expected = expecting(*others, (HERE[1][0] + step, *HERE[1][1:]))
+    standing = people(*others, HERE[1], arrives)
+    answer = explained(kind, BETWEEN, standing, expected)
+    who = answer.people.track_index
+    assert sorted(who.tolist()) == [-1, 0, 1, 2, 3] and not is_searched(answer)
+    np.testing.assert_allclose(answer.people.ground, standing[who, :2], atol=0.1)
+    np.testing.assert_allclose(answer.people.height[who < 0], standing[-1, 2], atol=0.06)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -155,7 +155,7 @@ def test_two_members_on_one_wide_silhouette_become_one_body(distance: float) -> 
     body = after.pool.at(after.members)
     assert np.hypot(*(body.ground[0] - pair(0.0)[0])) < 0.15
     assert body.width[0] > BODY.width_mean + BODY.width_spread
-    assert after.members_score.total > before.members_score.total
+    assert after.total > before.total
 
 
 @pytest.mark.parametrize("distance", [0.45, 0.5, 0.55])
@@ -200,7 +200,7 @@ def test_a_merge_is_the_better_of_both_sets_by_the_plain_score(width: float, dis
     sets = ([0, 1], [2], [3])  # both; one at the leading member's place; one between them
     scores = [reference.set_score(members, after.problem) for members in sets]
     assert after.members.tolist() == sets[int(np.argmax(scores))]
-    assert after.members_score.total == pytest.approx(max(scores), abs=1e-3)
+    assert after.total == pytest.approx(max(scores), abs=1e-3)
 
 
 def nearest_pair(ground: Floats) -> float:
@@ -310,7 +310,7 @@ def test_no_set_becomes_less_likely(seed: int) -> None:
     _, views, predicted = box_crowd(seed)
     before = of_tracks(views, predicted)
     after = restarted(before, box_detector().lattice_ground)
-    assert after.members_score.total >= before.members_score.total
+    assert after.total >= before.total
 
 
 def box_tables(estimate: MapEstimate) -> list[Floats | Ints]:

@@ -165,8 +165,7 @@ def test_rises_of_exchanges_are_differences_of_scores(seed: int) -> None:
     frame, rng = scaled(random_frame(seed, 8, 3)), np.random.default_rng(seed)
     order, leaving, rises = rng.permutation(8), rng.random((6, 8)) < 0.4, np.empty(6)
     members, joining = order[:5], rng.choice(order[5:], 6)
-    total = fill_rises(members, leaving, joining, frame.problem(), rises)
-    assert total == pytest.approx(frame.score(members) - frame.score([]), abs=1e-9)
+    fill_rises(members, leaving, joining, frame.problem(), rises)
     after = [[*members[~left[members]], i] for left, i in zip(leaving, joining, strict=True)]
     np.testing.assert_allclose(rises, [frame.score(one) - frame.score(members) for one in after], rtol=0, atol=1e-9)
 

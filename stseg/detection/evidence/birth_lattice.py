@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stseg.arrays import Floats
+from stseg.arrays import Flags, Floats
 from stseg.detection.evidence.candidate_evidence import peaks
 from stseg.detection.evidence.pillar_evidence import fill_scores
 from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels
@@ -23,16 +23,19 @@ def lattice(grid: Grid, spacing: float) -> Floats:
     return np.stack(np.meshgrid(x, y), -1)
 
 
-def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candidates:
+def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats, is_open: Flags | None = None) -> Candidates:
     """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
 
     Pixels are summed at one or two heights first, and at the others only where one of those scores well enough.
-    `lattice_ground` float64 (y, x, 2) is that of the views, metres.
+    `lattice_ground` float64 (y, x, 2) is that of the views, metres; `is_open` bool (y, x) where peaks may lie, by
+    default everywhere.
     """
     evidence = estimate.evidence
     prior, (rows, columns) = evidence.prior, lattice_ground.shape[:2]
     heights = np.asarray(prior.body.heights)
     score = evidence.box_lattice.score(estimate.box_assignment).reshape(len(heights), rows * columns)
+    if is_open is not None:
+        score[:, ~is_open.ravel()] = -np.inf
     if len(evidence.rasters):
         pixels = UnexplainedPixels.of(evidence.rasters, estimate.owners, evidence.lattice, evidence.extremes)
         probes = _probes(heights)

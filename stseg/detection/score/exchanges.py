@@ -2,23 +2,23 @@
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.problem import DetectionProblem
-from stseg.detection.score.moves import add, copy_of, release, remove, return_to
+from stseg.detection.score.moves import add, copy_of, put, release, remove, return_to
 from stseg.detection.score.set_state import set_state
 from stseg.kernels.accelerate import kernel
 from stseg.kernels.pointed_tuples import pointed
 
 
 @kernel
-def fill_rises(members: Ints, leaving: Flags, joining: Ints, problem: DetectionProblem, rises: Floats) -> float:
+def fill_rises(members: Ints, leaving: Flags, joining: Ints, problem: DetectionProblem, rises: Floats) -> None:
     """Fill rises float64 (k,): by how much one exchange each raises the score of the members, int64 (n,), nats.
 
     In exchange k the members leave that `leaving` bool (k, candidate) marks, and candidate `joining[k]` joins, int64
-    (k,). Returns the score of the members.
+    (k,).
     """
     whole = set_state(problem)
     state = pointed(whole)
     for i in members:
-        add(i, state.size[0], state)
+        put(i, state.size[0], state)
     for k in range(len(joining)):
         before = copy_of(state)
         for a in range(state.size[0] - 1, -1, -1):
@@ -28,4 +28,4 @@ def fill_rises(members: Ints, leaving: Flags, joining: Ints, problem: DetectionP
         rises[k] = state.total[0] - before.values[0]
         return_to(before, state)
     release(state)
-    return float(whole.total[0])
+    whole.size[0] = 0  # held by name until here (`pointed`)

@@ -124,6 +124,17 @@ def release(state: SetState) -> None:
 
 
 @kernel
+def score_of(members: Ints, problem: DetectionProblem) -> float:
+    """Score of the members, int64 (n,), of a problem: nats."""
+    whole = set_state(problem)
+    state = pointed(whole)
+    for i in members:
+        add(i, state.size[0], state)
+    release(state)
+    return float(whole.total[0])
+
+
+@kernel
 def fill_gains(
     members: Ints,
     candidates: Ints,
@@ -132,16 +143,16 @@ def fill_gains(
     view_evidence: Floats,
     boxes: Ints,
     tracks: Ints,
-) -> float:
+) -> None:
     """Fill gains (k,) with those of some candidates, int64 (k,), in the set of the members, int64 (n,): nats.
 
     Filled with what `fill_evidence` says of each, of members beside the others, are `view_evidence` float64 (view, k),
-    boxes int64 (view, k) and tracks int64 (k,). Returns the score of the members.
+    boxes int64 (view, k) and tracks int64 (k,).
     """
     whole = set_state(problem)
     state = pointed(whole)
     for i in members:
-        add(i, state.size[0], state)
+        put(i, state.size[0], state)
     for k in range(len(candidates)):
         i, place, is_member = candidates[k], 0, state.inside[candidates[k]]
         while is_member and state.members[place] != i:
@@ -153,4 +164,4 @@ def fill_gains(
         if is_member:
             put(i, place, state)
     release(state)
-    return float(whole.total[0])
+    whole.size[0] = 0  # held by name until here (`pointed`)

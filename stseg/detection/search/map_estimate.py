@@ -18,7 +18,7 @@ from stseg.detection.evidence.candidate_evidence import ProjectedBodies
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.detection.problem import DetectionProblem
 from stseg.detection.score.exchanges import fill_rises
-from stseg.detection.score.moves import fill_gains
+from stseg.detection.score.moves import fill_gains, score_of
 from stseg.detection.search.best_set import GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
@@ -28,8 +28,6 @@ from stseg.records.candidates import Candidates
 class Additions:
     """Candidates, each as a further member of a set; members of it, each beside the others."""
 
-    total: float
-    """Score of the set, nats."""
     gain: Floats
     """float64 (m,): change of the score, nats."""
     view_evidence: Floats
@@ -97,11 +95,11 @@ class MapEstimate:
     @cached_property
     def total(self) -> float:
         """Score of the members, nats."""
-        return self.additions(self.members[:0]).total
+        return score_of(self.members, self.problem)
 
     @cached_property
     def members_score(self) -> Additions:
-        """Score of the members, and `additions` of them."""
+        """`additions` of the members."""
         return self.additions(self.members)
 
     @property
@@ -114,10 +112,10 @@ class MapEstimate:
         gains, tracks = np.empty(len(candidates)), np.empty(len(candidates), np.int64)
         evidence = np.zeros((len(self.evidence.views), len(candidates)))
         box = np.full(evidence.shape, -1, np.int64)
-        total = fill_gains(self.members, candidates, self.problem, gains, evidence, box, tracks)
+        fill_gains(self.members, candidates, self.problem, gains, evidence, box, tracks)
         pixels_last = np.argsort([isinstance(view, PixelView) for view in self.evidence.views], kind="stable")
         order = np.argsort(pixels_last)  # the problem has the views with boxes first
-        return Additions(total, gains, evidence[order], tracks, box[order])
+        return Additions(gains, evidence[order], tracks, box[order])
 
     def rises(self, leaving: Flags, joining: Ints) -> Floats:
         """Rise of the score by each exchange, float64 (k,), nats: see `stseg.detection.score.exchanges`."""

@@ -13,6 +13,7 @@ from stseg.arrays import Flags, Ints
 from stseg.bodies.views import PixelView
 from stseg.detection.search.local_search import SCORE_TOLERANCE
 from stseg.detection.search.map_estimate import MapEstimate
+from stseg.detection.search.open_ground import EVERYWHERE, OpenGround
 from stseg.detection.search.refined_people import refined_members
 from stseg.geometry.distances import distances
 from stseg.records.candidates import Candidates
@@ -21,9 +22,9 @@ _MERGE_DISTANCE = 0.6
 """Members at less than this distance may be one body, metres: half the widest body and half a common one."""
 
 
-def merged(estimate: MapEstimate) -> MapEstimate:
-    """The estimate with close members as one wherever that explains the frame better."""
-    is_close = _close_pairs(estimate)
+def merged(estimate: MapEstimate, ground: OpenGround = EVERYWHERE) -> MapEstimate:
+    """The estimate with close members as one wherever on the open ground that explains the frame better."""
+    is_close = _close_pairs(estimate, ground)
     if not is_close.any() or not any(isinstance(view, PixelView) for view in estimate.evidence.views):
         return estimate
     separate = _separate_members(estimate, is_close)
@@ -82,10 +83,12 @@ def _centred(estimate: MapEstimate, is_close: Flags, separate: Ints) -> MapEstim
     return estimate.with_more(moved).with_members(np.arange(first, first + len(separate)))
 
 
-def _close_pairs(estimate: MapEstimate) -> Flags:
-    """Pairs of members that may be one body, bool (n, n)."""
+def _close_pairs(estimate: MapEstimate, open_ground: OpenGround) -> Flags:
+    """Pairs of members on open ground that may be one body, bool (n, n)."""
     ground = estimate.pool.ground[estimate.members]
-    return np.asarray((distances(ground, ground) < _MERGE_DISTANCE) & ~np.eye(len(ground), dtype=bool))
+    is_open = open_ground.covers(ground)
+    is_close = (distances(ground, ground) < _MERGE_DISTANCE) & ~np.eye(len(ground), dtype=bool)
+    return np.asarray(is_close & is_open & is_open[:, None])
 
 
 def _separate_members(estimate: MapEstimate, is_close: Flags) -> Ints:

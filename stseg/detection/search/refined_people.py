@@ -1,6 +1,10 @@
 """Members of an estimate at the means of their posteriors, by the boxes and pixels that are assigned to each."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+
+import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.bodies.views import BoxView
@@ -24,31 +28,50 @@ class RefinedPeople:
     track_sizes: Sizes
     """Size posteriors of all frames so far."""
 
+    def at(self, chosen: Ints) -> RefinedPeople:
+        """The chosen, int64 (k,), in that order."""
+        return RefinedPeople(
+            self.pool.at(chosen), self.covariance[chosen], self.sizes.at(chosen), self.track_sizes.at(chosen)
+        )
 
-def moved_members(estimate: MapEstimate) -> Candidates:
-    """The members at the means of their places, each at the size that it has."""
-    pool = estimate.pool.at(estimate.members)
-    places = refine_places(pool, estimate.evidence, _assignment(estimate), estimate.track_index)
+    def joined_with(self, others: RefinedPeople) -> RefinedPeople:
+        """These people, then others."""
+        return RefinedPeople(
+            self.pool.joined_with(others.pool),
+            np.concatenate([self.covariance, others.covariance]),
+            self.sizes.joined_with(others.sizes),
+            self.track_sizes.joined_with(others.track_sizes),
+        )
+
+
+def moved_members(estimate: MapEstimate, chosen: Ints) -> Candidates:
+    """Some of the members, int64 (k,) counted from 0, at the means of their places, each at the size that it has."""
+    pool = estimate.pool.at(estimate.members[chosen])
+    places = refine_places(pool, estimate.evidence, _assignment(estimate, chosen), estimate.track_index[chosen])
     return Candidates(places.ground, pool.height, pool.width)
 
 
 def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
     """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
     if chosen is None:
-        return _refined(estimate, estimate.pool.at(estimate.members), _assignment(estimate), estimate.track_index)
+        everyone = np.arange(len(estimate.members))
+        return _refined(
+            estimate, estimate.pool.at(estimate.members), _assignment(estimate, everyone), estimate.track_index
+        )
     members = estimate.members[chosen]
     score = estimate.additions(members)
     assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, chosen)
     return _refined(estimate, estimate.pool.at(members), assignment, score.track_index)
 
 
-def followed_members(estimate: MapEstimate, start: Candidates) -> RefinedPeople:
-    """The members at the means of their places, which are sought about those of `start`, one for each member.
+def followed_members(estimate: MapEstimate, chosen: Ints, start: Candidates) -> RefinedPeople:
+    """Some of the members, int64 (k,) counted from 0, at the means of their places, sought about those of `start`.
 
     Their sizes are those of their tracks where all views show pixels: a size errs alike in frames that follow each
     other, so few of them need to measure it. Boxes show heights and places together.
     """
-    evidence, assignment, track_index = estimate.evidence, _assignment(estimate), estimate.track_index
+    evidence, assignment = estimate.evidence, _assignment(estimate, chosen)
+    track_index = estimate.track_index[chosen]
     if any(isinstance(view, BoxView) for view in evidence.views):
         return _refined(estimate, start, assignment, track_index)
     places = refine_places(start, evidence, assignment, track_index)
@@ -57,8 +80,8 @@ def followed_members(estimate: MapEstimate, start: Candidates) -> RefinedPeople:
     return RefinedPeople(Candidates(places.ground, sizes.height, sizes.width), places.covariance, unmeasured, sizes)
 
 
-def _assignment(estimate: MapEstimate) -> EvidenceAssignment:
-    return EvidenceAssignment.of_all(estimate.member_boxes, estimate.pixel_assignment)
+def _assignment(estimate: MapEstimate, chosen: Ints) -> EvidenceAssignment:
+    return EvidenceAssignment(estimate.member_boxes[:, chosen], estimate.pixel_assignment, chosen)
 
 
 def _refined(

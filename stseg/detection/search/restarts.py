@@ -7,7 +7,7 @@ track. So the weak members are removed together, and the frame is searched from 
 
 import numpy as np
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 from stseg.detection.evidence.birth_lattice import lattice_candidates
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.refined_people import refined_members
@@ -38,14 +38,14 @@ def better_of(estimate: MapEstimate, trial: MapEstimate) -> MapEstimate:
     return trial if trial.total > estimate.total + _MINIMUM_GAIN else estimate
 
 
-def has_weak_members(estimate: MapEstimate) -> bool:
-    """Whether an estimate has members that a restart would remove."""
-    return bool((estimate.losses < _REMOVAL_MARGIN).any())
+def weak_members(estimate: MapEstimate) -> Ints:
+    """Members that a restart would remove, int64 (k,), counted from 0."""
+    return np.flatnonzero(estimate.losses < _REMOVAL_MARGIN)
 
 
 def _from_strong_members(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
     """A search that begins with the strong members; twice, the second time with places refined."""
-    strong = estimate.members[estimate.losses >= _REMOVAL_MARGIN]
+    strong = np.delete(estimate.members, weak_members(estimate))
     if len(strong) == len(estimate.members):
         return estimate
     more = lattice_candidates(estimate.with_members(strong), lattice_ground).new_to(estimate.pool)
