@@ -60,21 +60,12 @@ def test_known_people_are_followed_to_where_a_search_finds_them(kind: str) -> No
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
-    ("standing", "predicted"),
-    [
-        ((*HERE, (0.4, 0.1)), HERE),
-        (((0.0, 0.0), (0.3, 0.0)), ((0.0, 0.0), (0.3, 0.0))),
-        (HERE, ((HERE[0][0] + 0.22, *HERE[0][1:]), HERE[1])),
-    ],
-    ids=["new", "near", "elsewhere"],
-)
+@cases()
 def test_the_whole_frame_is_searched_where_something_is_open(
     kind: str, standing: Sequence[Sequence[float]], predicted: Sequence[Sequence[float]]
 ) -> None:
     views, expected = people(*standing), expecting(*predicted)
-    detector_of_kind = detector(kind)
-    by_search = detector_of_kind.explain(show(kind, views), expected)
+    by_search = detector(kind).explain(show(kind, views), expected)
     answer = explained(kind, BETWEEN, views, expected)
     assert len(answer.people) == len(standing)
     np.testing.assert_array_equal(answer.people.ground, by_search.people.ground)
@@ -82,11 +73,10 @@ def test_the_whole_frame_is_searched_where_something_is_open(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("arrives", "step"), [((0.1, 1.1), 0.0), ((-0.2, -1.1), 0.22)])
+@cases()
 def test_ground_is_searched_beside_settled_people(kind: str, arrives: Sequence[float], step: float) -> None:
-    others = HERE[0], (-1.2, 1.3), (-1.3, -0.9)
-    expected = expecting(*others, (HERE[1][0] + step, *HERE[1][1:]))
-    standing = people(*others, HERE[1], arrives)
+    expected = expecting(HERE[0], (-1.2, 1.3), (-1.3, -0.9), (HERE[1][0] + step, *HERE[1][1:]))
+    standing = people(HERE[0], (-1.2, 1.3), (-1.3, -0.9), HERE[1], arrives)
     answer = explained(kind, BETWEEN, standing, expected)
     who = answer.people.track_index
     assert sorted(who.tolist()) == [-1, 0, 1, 2, 3] and not is_searched(answer)
