@@ -8,7 +8,6 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.search.map_estimate import MapEstimate
-from stseg.geometry.distances import distances
 
 
 @dataclass(frozen=True)
@@ -31,9 +30,12 @@ class OpenGround:
 
     def covers(self, ground: Floats) -> Flags:
         """Whether each point (n, 2) lies on it."""
-        if self.places is None:
-            return np.ones(len(ground), bool)
-        return np.asarray(distances(ground, self.places).min(1, initial=np.inf) < self.reach)
+        is_covered = np.full(len(ground), self.places is None)
+        for place in () if self.places is None else self.places:  # all pairs of a large lattice would fill the memory
+            offset = np.abs(ground - place)
+            near = np.flatnonzero((offset[:, 0] < self.reach) & (offset[:, 1] < self.reach))
+            is_covered[near] |= np.hypot(*offset[near].T) < self.reach
+        return is_covered
 
     def members_of(self, estimate: MapEstimate) -> Ints:
         """Members of an estimate that stand on it, int64 (k,), counted from 0."""
