@@ -158,6 +158,7 @@ class Detector:
         else:
             learned.population.skip_frame()
             learned.rims.skip_frame()
+        learned.frames += 1
         if failures.excluded.any():
             return self._with_excluded_residuals(explanation, observations, failures.excluded)
         return explanation
@@ -173,7 +174,8 @@ class Detector:
         """A frame's explanation by what has been learned, and whether the whole ground was searched for it."""
         evidence = self._evidence(learned.rims.applied(observations), learned.population.body, predicted)
         tracks = self._search.of_tracks(evidence)
-        if not is_key and predicted is not None and proposals is None:
+        is_new = learned.frames < self._key_interval
+        if not (is_key or is_new) and predicted is not None and proposals is None:
             explanation = followed_frame(tracks, self._search)
             if explanation is not None:
                 return explanation, False

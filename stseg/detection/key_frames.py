@@ -1,7 +1,8 @@
 """Frames between key frames: people of whom nothing is open are followed, and only the ground about others is searched.
 
-In a key frame the whole ground is searched: births, merges, ghosts and sizes. The frames between need it only where
-something may be decided otherwise than by the best set of the predicted tracks alone. Open are the places
+In a key frame, and in the first frames of a session, the whole ground is searched: births, merges, ghosts and sizes.
+The frames between need it only where something may be decided otherwise than by the best set of the predicted tracks
+alone. Open are the places
 
 - of members that continue no track, and of those without which the score would lose less than `DECISION_MARGIN` nats,
 - of further candidates, of the other tracks or of the lattice by the evidence that the members leave unexplained, that

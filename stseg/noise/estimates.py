@@ -9,7 +9,7 @@ from stseg.noise.rim_estimate import RimEstimate
 from stseg.view_health.view_failures import ViewFailures
 
 
-@dataclass(frozen=True)
+@dataclass
 class Estimates:
     """Estimates of one session; each frame that is explained updates them."""
 
@@ -22,3 +22,5 @@ class Estimates:
     """Eaten edges of silhouettes."""
     failures: ViewFailures
     """Views that fail."""
+    frames: int = 0
+    """Frames that were explained so far."""

@@ -32,8 +32,9 @@ def show(kind: str, standing: Floats) -> list[ViewEvidence]:
 
 
 def explained(kind: str, frame: int, standing: Floats, predicted: PredictedTracks) -> Explanation:
-    detector_of_kind = detector(kind)
-    return detector_of_kind.explain_next(detector_of_kind.new_estimates(), frame, show(kind, standing), predicted)
+    learned = detector(kind).new_estimates()
+    learned.frames = int(RATE)
+    return detector(kind).explain_next(learned, frame, show(kind, standing), predicted)
 
 
 def is_searched(explanation: Explanation) -> bool:
@@ -67,9 +68,7 @@ def test_the_whole_frame_is_searched_where_something_is_open(
     views, expected = people(*standing), expecting(*predicted)
     by_search = detector(kind).explain(show(kind, views), expected)
     answer = explained(kind, BETWEEN, views, expected)
-    assert len(answer.people) == len(standing)
     np.testing.assert_array_equal(answer.people.ground, by_search.people.ground)
-    np.testing.assert_array_equal(answer.people.sizes.height, by_search.people.sizes.height)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -111,6 +110,7 @@ def test_walkers_are_followed_as_by_searches(kind: str) -> None:
         answer = detector_of_kind.explain_next(learned, frame, show(kind, standing), follow.predict(frame))
         names |= set(follow.update(frame, answer.people, answer.ghosts).tolist())
         searched += is_searched(answer)
+        assert searched == frame + 1 or frame >= 10
         away = np.hypot(*(answer.people.ground[:, None] - standing[:, :2]).transpose(2, 0, 1))
         assert away.shape == (3, 3) and away.min(0).max() < 0.12
     assert len(names) == 3 and 3 <= searched < 16

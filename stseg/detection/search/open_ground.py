@@ -33,8 +33,8 @@ class OpenGround:
         is_covered = np.full(len(ground), self.places is None)
         for place in () if self.places is None else self.places:  # all pairs of a large lattice would fill the memory
             offset = np.abs(ground - place)
-            near = np.flatnonzero((offset[:, 0] < self.reach) & (offset[:, 1] < self.reach))
-            is_covered[near] |= np.hypot(*offset[near].T) < self.reach
+            rows = np.flatnonzero((offset[:, 0] < self.reach) & (offset[:, 1] < self.reach))
+            is_covered[rows] |= np.hypot(*offset[rows].T) < self.reach
         return is_covered
 
     def members_of(self, estimate: MapEstimate) -> Ints:
