@@ -35,8 +35,8 @@ def _unrevised(_: object, frames: Sequence[TrackedFrame], first: int, stop: int)
 
 WHOLE: dict[str, tuple[str, Any]] = {
     "restart": (f"{_SEARCH}.restarted", lambda estimate, _: estimate),
-    "searched afresh": (f"{_DETECTOR}.has_weak_members", lambda _: False),
-    "merging": (f"{_SEARCH}.merged", lambda estimate: estimate),
+    "searched afresh": (f"{_DETECTOR}.weak_members", lambda _: ()),
+    "merging": (f"{_SEARCH}.merged", lambda estimate, *_: estimate),
     "fitted alternatives": (f"{_SEARCH}._fitted", lambda estimate, others: estimate.pool.at(others[:0])),
     "swaps": (f"{_DETECTOR}.FrameSearch", lambda ground, boxes, rounds, _: FrameSearch(ground, boxes, rounds, 0)),
     "key frames": (f"{_DETECTOR}.key_frame_interval", lambda *_: 1),
