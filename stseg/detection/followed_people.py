@@ -73,35 +73,35 @@ def followed_people(tracks: MapEstimate, chosen: Ints) -> tuple[FollowedPeople, 
 
 
 def searched_beside(
-    settled: FollowedPeople, tracks: MapEstimate, births: Candidates, ground: OpenGround, search: FrameSearch
+    followed: FollowedPeople, tracks: MapEstimate, births: Candidates, ground: OpenGround, search: FrameSearch
 ) -> Explanation | None:
-    """The explanation by settled people and a search of the open ground; None where that leaves too many in doubt.
+    """The explanation by followed people and a search of the open ground; None where that leaves too many in doubt.
 
     `tracks` is the estimate that has them as members, `births` are candidates that join its own in the search.
     """
-    rest = np.delete(np.arange(len(tracks.pool)), tracks.members[settled.member])
-    is_open = np.isin(rest, np.delete(tracks.members, settled.member))
-    pool, number = settled.people.pool.joined_with(tracks.pool.at(rest)).joined_with(births), len(settled.member)
+    rest = np.delete(np.arange(len(tracks.pool)), tracks.members[followed.member])
+    is_open = np.isin(rest, np.delete(tracks.members, followed.member))
+    pool, number = followed.people.pool.joined_with(tracks.pool.at(rest)).joined_with(births), len(followed.member)
     start = np.concatenate([np.arange(number), number + np.flatnonzero(is_open)])
     estimate = MapEstimate.of_search(tracks.evidence, pool, start)
     for _ in range(_SEARCH_LIMIT):
         estimate = search.whole(estimate, None, ground)
-        member, is_settled = _members_of(settled, estimate)
-        if is_settled.all():
-            return _explained(estimate, member, settled.people)
-        ground = ground.joined_with(settled.people.pool.ground[~is_settled])
-        settled = settled.off(ground)
+        member, is_sure = _members_of(followed, estimate)
+        if is_sure.all():
+            return _explained(estimate, member, followed.people)
+        ground = ground.joined_with(followed.people.pool.ground[~is_sure])
+        followed = followed.off(ground)
     return None
 
 
-def _members_of(settled: FollowedPeople, estimate: MapEstimate) -> tuple[Ints, Flags]:
+def _members_of(followed: FollowedPeople, estimate: MapEstimate) -> tuple[Ints, Flags]:
     """The member that each is, int64 (n,), and whether it surely is one, of the same track, bool (n,)."""
-    away = distances(settled.people.pool.ground, estimate.pool.ground[estimate.members])
+    away = distances(followed.people.pool.ground, estimate.pool.ground[estimate.members])
     if not len(estimate.members):
         return np.zeros(len(away), np.int64), np.zeros(len(away), bool)
     member = away.argmin(1)
     is_sure = (away.min(1) == 0) & (estimate.losses[member] >= DECISION_MARGIN)
-    return member, is_sure & (estimate.track_index[member] == settled.track_index)
+    return member, is_sure & (estimate.track_index[member] == followed.track_index)
 
 
 def _explained(estimate: MapEstimate, member: Ints, followed: RefinedPeople) -> Explanation:

@@ -11,10 +11,10 @@ alone. Open are the places
 - of members that touch, or nearly, their places being uncertain by `PREDICTION_DISTANCE`,
 - and of members that stand farther than `PREDICTION_DISTANCE` from their track's prediction.
 
-Members far from all of these are settled: each stands where its own evidence shows it. If nothing is open, they are the
-answer. If they are the most, the open ground is searched beside them, and they stay settled if each of them is worth
-`DECISION_MARGIN` nats after it. Otherwise the frame is searched as a whole. The rule reads the frame's number, its
-evidence and its prediction alone, so it does not depend on the process that works on the frame.
+Members far from all of these are followed: each stands where its own evidence shows it. If nothing is open, they are
+the answer. If they are the majority, the open ground is searched beside them, and that is the answer if each of them is
+worth `DECISION_MARGIN` nats after it. Otherwise the frame is searched as a whole. The rule reads the frame's number,
+its evidence and its session alone, so it does not depend on the process that works on the frame.
 """
 
 import numpy as np

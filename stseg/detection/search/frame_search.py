@@ -138,7 +138,10 @@ def _fitted(estimate: MapEstimate, rejected: Ints) -> Candidates:
 
 
 def _same_people(members: Ints, before: Ints, number: int, chosen: Ints) -> bool:
-    """Whether a search among `number` candidates, those that `before` moved to, and others kept just these people."""
+    """Whether a search among `number` candidates, those that some of `before` moved to, and others kept all people.
+
+    `members` int64 (m,) and `before` (n,) are candidates, `chosen` (k,) counts those of `before` that were moved.
+    """
     moved = (members >= number) & (members < number + len(chosen))
     origin = members.copy()
     origin[moved] = before[chosen[members[moved] - number]]

@@ -54,10 +54,8 @@ def moved_members(estimate: MapEstimate, chosen: Ints) -> Candidates:
 def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
     """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
     if chosen is None:
-        everyone = np.arange(len(estimate.members))
-        return _refined(
-            estimate, estimate.pool.at(estimate.members), _assignment(estimate, everyone), estimate.track_index
-        )
+        assignment = EvidenceAssignment.of_all(estimate.member_boxes, estimate.pixel_assignment)
+        return _refined(estimate, estimate.pool.at(estimate.members), assignment, estimate.track_index)
     members = estimate.members[chosen]
     score = estimate.additions(members)
     assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, chosen)
