@@ -39,6 +39,7 @@ def rows_of(people: Mapping[int, tuple[Path, float, range]], noise: float = 0.02
     rng = np.random.default_rng(3)
     told = sorted((t, track, path(t / RATE), tall) for track, (path, tall, frames) in people.items() for t in frames)
     rows = np.zeros(len(told), TRAJECTORY)
+    rows["xx"] = rows["yy"] = 0.02**2
     for row, (frame, track, place, tall) in zip(rows, told, strict=True):
         row["frame"], row["id"], row["height"] = frame, track, tall + rng.normal(0, CONFIG.tracking.height_noise)
         row["x"], row["y"] = np.array(place) + rng.normal(0, noise, 2)

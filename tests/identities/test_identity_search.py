@@ -66,7 +66,6 @@ def test_early_names_are_of_one_hypothesis_and_later_ones_count() -> None:
     # Two are exchanged by the filter while they stand together, unmeasured: both readings are kept until they part.
     true = rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), 1.85, range(160))}, noise=0.0)
     true["height"][(true["frame"] >= 66) & (true["frame"] < 110)] = np.nan
-    true["xx"] = true["yy"] = 0.02
     seen = seen_of(swapped(true, 80))
     names, apart = found(seen), np.abs(seen.rows.ground[:, 0]) > 0.5
     assert len(np.unique([names[apart], true["id"][seen.order][apart]], axis=1).T) == 2
@@ -100,7 +99,6 @@ def heights_of(people: Floats, noise: float, seed: int = 0) -> tuple[Floats, Int
 def test_outliers_say_no_more_against_a_person_than_they_may(most: float, low: list[float], people: int) -> None:
     """Two walk side by side; for a frame one of them is measured too short, or stoops from then on."""
     rows = rows_of({k: (straight(-1, 0.5 * k, 0.5, 0), 1.7 + 0.1 * k, range(20)) for k in (1, 2)}, noise=0.0)
-    rows["xx"] = rows["yy"] = 0.02
     rows["height"][np.flatnonzero(rows["id"] == 1)[10 : 10 + len(low)]] = low
     seen = observe(rows, [rows["height"].astype(float)], MODEL, RATE, BORDER, CONFIG)
     model = replace(MODEL, most_against=np.full(1, most))

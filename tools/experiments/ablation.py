@@ -56,7 +56,6 @@ FINAL: dict[str, tuple[str, Any]] = {
     "short tracks dropped": (f"{_FINAL}.drop_short", lambda rows, *_: (np.unique(rows["id"]), _NO_EVENTS)),
     "short gaps filled": (f"{_FINAL}.interpolated_rows", lambda rows, *_: rows[:0]),
     "encounters": ("stseg.tracking.row_groups._meetings", lambda rows, _: (rows["id"][:0], rows["frame"][:0])),
-    "least error of places": (f"{_OBSERVED}._LEAST_PLACE_ERROR", 1e-3),
     "last smoothing": (f"{_FINAL}.smooth_places", lambda *_: None),
 }
 """The same of final tracks, which are found again from the rows of one run."""

@@ -16,9 +16,6 @@ from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.border import Border
 from stseg.tracking.row_groups import EXCHANGE_DISTANCE, near_rows
 
-_LEAST_PLACE_ERROR = 0.05
-"""Least error of a place, metres (standard deviation)."""
-
 
 class ObservedRows(NamedTuple):
     """Rows of a run in the order of time, for kernels."""
@@ -96,7 +93,7 @@ def observe(
     ground = np.column_stack([trajectory["x"][order], trajectory["y"][order]])
     precision, information = model.evidence(sizes, order)
     alike = PLACE_ERROR.row_variance(frame_rate)
-    variance = np.maximum(alike * (trajectory["xx"] + trajectory["yy"])[order] / 2, _LEAST_PLACE_ERROR**2)
+    variance = alike * (trajectory["xx"] + trajectory["yy"])[order] / 2
     previous, inside = _previous(frame, track), border.inside(ground, config.detection.border_width)
     alone = np.ones(len(order), bool)
     alone[near_rows(trajectory, EXCHANGE_DISTANCE)[0]] = False
