@@ -95,6 +95,10 @@ class Table:
         value = self._checked(name, expected, lambda value: type(value) is int and low <= value <= high)
         return int(value)
 
+    def require(self, name: str, value: object, expected: str) -> None:
+        """One value alone, of its own type."""
+        self._checked(name, expected, lambda found: type(found) is type(value) and found == value)
+
     def truth(self, name: str) -> bool:
         """True or false."""
         return bool(self._checked(name, "true or false", lambda value: isinstance(value, bool)))

@@ -71,8 +71,7 @@ def parse_rig(text: str, path: Path) -> Recording:
         top = Table(path, "", parse_toml(text))
     except ValueError as error:
         raise RigError(path, "", f"what is not TOML ({error})", "TOML") from error
-    if (found := top.integer("format", 0, 999)) != FORMAT:
-        raise top.error("format", found, f"{FORMAT}, the format that this version reads")
+    top.require("format", FORMAT, f"{FORMAT}, the format that this version reads")
     top.allow("format", "scene", "grid", "body", "camera")
     scene, tables = top.table("scene"), _named(top.tables("camera", limits.CAMERAS))
     scene.allow("name", "frame_rate", "x", "y", "polygon", "doors", "closed")

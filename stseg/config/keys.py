@@ -17,7 +17,7 @@ _USER = {
     "foreground": "model body_rows",
     "foreground.mixture": "memory absorption_time darkest_shadow",
     "detection": "prior_log_odds birth_cost border_width minimum_distance",
-    "tracking": "window patience maximum_gap interpolation_gap minimum_duration",
+    "tracking": "window patience return_probability maximum_gap interpolation_gap minimum_duration",
     "segments": "length background_period",
     "live": "file_quiet_time background_time stream_timeout buffer_time buffer_memory",
 }

@@ -35,7 +35,7 @@ class TrackingConfig(Settings):
     """Windows, and tracks from tracklets (how-it-works, Tracks)."""
 
     window: float = positive(1.0)
-    """Length of a window, seconds; held between 8 and 30 frames. Tracks are final one window and
+    """Length of a window, seconds; held between 8 and 30 frames. Places are decided one window and
     `context` later."""
     context: float = not_negative(1.0)
     """Time before and after a window that counts, too, when it is decided who is real, seconds; at most 30 frames."""

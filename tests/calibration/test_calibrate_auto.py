@@ -282,7 +282,7 @@ def test_bad_options_are_told(tmp_path: Path, options: dict[str, tuple[str, ...]
 def test_another_frame_rate_is_named(tmp_path: Path, frame_rate: float, count: int) -> None:
     film = write_at_rate(tmp_path / "a.avi", [np.zeros((48, 64, 3), np.uint8)] * 5, 5.0)
     notes = frame_rate_notes([film], frame_rate)
-    assert len(notes) == count and all("has 5 frames per second by its head, not 25" in note for note in notes)
+    assert len(notes) == count and all("has 5 frames per second by its header, not 25" in note for note in notes)
 
 
 def test_videos_need_different_names_and_more_than_one(tmp_path: Path) -> None:
@@ -291,7 +291,7 @@ def test_videos_need_different_names_and_more_than_one(tmp_path: Path) -> None:
     refused(SourceError, "no such file", calibrate_auto, a, b, output=rig, frame_rate=5.0)
     for path, rate in ((a, 5.0), (b, 4.0)):
         write_at_rate(path, [np.zeros((48, 64, 3), np.uint8)] * 5, rate)
-    refused(ConfigError, "--frame-rate: found 4 and 5 by the heads", calibrate_auto, a, b, output=rig)
+    refused(ConfigError, "--frame-rate: found 4 and 5 by the headers", calibrate_auto, a, b, output=rig)
 
 
 SPEC = SceneSpec("walking", 2, (6.0, 6.0), 40.0, 5.0, 2, seed=1, distortion=(-0.2, 0.03))

@@ -122,7 +122,7 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
             sentences.append(f"the views agree: none is off by more than {cell}; {most}")
         else:
             least = f"certainly by {100 * worst.certainly_off:.0f} cm"
-            sentences.append(f"no view is certainly off by more than {cell}; {most}, {least}: look at more frames")
+            sentences.append(f"no view is certainly off by more than {cell}; {most}, {least}: check more --frames")
     return sentences
 
 

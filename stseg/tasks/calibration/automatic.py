@@ -98,7 +98,7 @@ def calibrate_auto(
     output
         The rig file to write.
     frame_rate
-        Frames per second of all videos; None for what their heads agree on.
+        Frames per second of all videos; None for what their headers agree on.
     person_height
         Mean body height, metres. It sets the scale where no distance is given.
     distances
@@ -128,11 +128,12 @@ def calibrate_auto(
     require_within("--most-delay", most_delay, _DELAYS)
     require_within("--cell", cell, limits.CELL)
     require_output(output, overwrite, Inputs(paths))  # before videos are opened, which may be none
+    cameras = _uncalibrated_cameras(paths)
     if frame_rate is None:
-        frame_rate = _rate_of_heads(paths)
-        reporter.note(f"{frame_rate:g} frames per second by the heads of the videos (--frame-rate)")
+        frame_rate = _rate_of_headers(paths)
+        reporter.note(f"{frame_rate:g} frames per second by the headers of the videos (--frame-rate)")
     require_within("--frame-rate", frame_rate, limits.FRAME_RATE)
-    streams = _streams(paths, output, frame_rate, background, source_kind)
+    streams = _streams(cameras, paths, output, frame_rate, background, source_kind)
     require_output(output, overwrite, Inputs(recording_files(replace(streams, path=Path()))))
     names = [camera.name for camera in streams.rig.cameras]
     known = [_known_distance(distance, streams.rig.cameras) for distance in distances]
@@ -187,21 +188,21 @@ def camera_names(videos: Sequence[Path]) -> list[str]:
 
 
 def frame_rate_notes(videos: Sequence[Path], frame_rate: float) -> list[str]:
-    """A sentence for each video whose head gives another frame rate."""
+    """A sentence for each video whose header gives another frame rate."""
     rates = [(path, read_frame_rate(path)) for path in videos if path.is_file()]
     return [
-        f"{path} has {rate:.6g} frames per second by its head, not {frame_rate:g}: give --frame-rate {rate:.6g}"
+        f"{path} has {rate:.6g} frames per second by its header, not {frame_rate:g}: give --frame-rate {rate:.6g}"
         for path, rate in rates
         if rate is not None and abs(np.log(rate / frame_rate)) > _RATE_MARGIN
     ]
 
 
-def _rate_of_heads(videos: Sequence[Path]) -> float:
-    """Frames per second on which the heads of all videos agree."""
+def _rate_of_headers(videos: Sequence[Path]) -> float:
+    """Frames per second on which the headers of all videos agree."""
     rates = {rate for path in videos if path.is_file() and (rate := read_frame_rate(path)) is not None}
     if len(rates) != 1:
         found = " and ".join(f"{rate:.6g}" for rate in sorted(rates)) or "nothing"
-        raise ConfigError("command line", "--frame-rate", f"{found} by the heads of the videos", "it to be given")
+        raise ConfigError("command line", "--frame-rate", f"{found} by the headers of the videos", "it to be given")
     return rates.pop()
 
 
@@ -210,21 +211,30 @@ def uncalibrated_camera(name: str, video: Path) -> Camera:
     return Camera.from_projection(name, read_video_size(video), _UNCALIBRATED)
 
 
-def _streams(
-    videos: Sequence[Path], output: Path, frame_rate: float, background: str | None, kind: Literal["video", "masks"]
-) -> Recording:
-    """The videos as a recording with placeholder cameras; streams may end at different times."""
+def _uncalibrated_cameras(videos: Sequence[Path]) -> tuple[Camera, ...]:
     names = camera_names(videos)
     if len(videos) < 2 or len(set(names)) < len(names):
-        raise ConfigError("calibrate auto", "VIDEO", ", ".join(map(str, videos)), "two or more, with different names")
-    cameras = tuple(uncalibrated_camera(name, path) for name, path in zip(names, videos, strict=True))
+        found = ", ".join(map(str, videos)) or "none"
+        raise ConfigError("calibrate auto", "VIDEO", found, "two or more, with different names")
+    return tuple(uncalibrated_camera(name, path) for name, path in zip(names, videos, strict=True))
+
+
+def _streams(
+    cameras: tuple[Camera, ...],
+    videos: Sequence[Path],
+    output: Path,
+    frame_rate: float,
+    background: str | None,
+    kind: Literal["video", "masks"],
+) -> Recording:
+    """The videos as a recording with placeholder cameras; streams may end at different times."""
     sources = tuple(
         CameraSource(
             Source(kind, path),
-            None if background is None else Source("video", Path(background.replace("{name}", name))),
+            None if background is None else Source("video", Path(background.replace("{name}", camera.name))),
             on_missing="blind",
         )
-        for name, path in zip(names, videos, strict=True)
+        for camera, path in zip(cameras, videos, strict=True)
     )
     return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
 
