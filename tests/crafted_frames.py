@@ -54,7 +54,7 @@ class CraftedFrame:
         return sorted(members[:count].tolist())
 
 
-def hiders_of_cover(cover: Floats) -> RaggedArray:
+def occluders_of_cover(cover: Floats) -> RaggedArray:
     """Candidates who cover a part of each, from cover (view, candidate, candidate)."""
     rows = cover.reshape(-1, cover.shape[2])
     number, item = np.nonzero(rows)
@@ -70,7 +70,7 @@ def random_frame(seed: int, candidates: int, tracks: int = 0) -> CraftedFrame:
     cover = rng.uniform(0, 1, (views, candidates, candidates)) * (rng.random((views, candidates, candidates)) < 0.3)
     cover[:, np.arange(candidates), np.arange(candidates)] = 0
     inside = rng.uniform(0.3, 1, (views, candidates))
-    boxes = BoxEvidence(match, np.array([most, 2]), hiders_of_cover(cover), inside)
+    boxes = BoxEvidence(match, np.array([most, 2]), occluders_of_cover(cover), inside)
     start = rng.integers(0, columns - 2, (views, candidates, 4))
     stop = np.minimum(start + rng.integers(0, 6, start.shape), columns)
     first = rng.integers(-1, rows - 1, (views, candidates))
@@ -105,7 +105,8 @@ def in_rooms(frame: CraftedFrame, size: int) -> CraftedFrame:
     for i, k in enumerate(room.tolist()):
         match[:, i, k * most : (k + 1) * most] = frame.boxes.match[:, i]
     cover = (1 - reference.left_by_all(frame.boxes)) * (room[:, None] == room)
-    boxes = frame.boxes._replace(match=match, hiders=hiders_of_cover(cover), boxes=np.full(len(match), most * rooms))
+    occluders, number = occluders_of_cover(cover), np.full(len(match), most * rooms)
+    boxes = frame.boxes._replace(match=match, occluders=occluders, boxes=number)
     track_gain = np.full((len(room), rooms * frame.track_gain.shape[1]), -50.0)
     for track, gains in enumerate(frame.track_gain.T):
         track_gain[np.arange(len(room)), track * rooms + room] = gains

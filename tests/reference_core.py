@@ -108,8 +108,8 @@ def left_by_all(boxes: BoxEvidence) -> Floats:
     views, candidates = boxes.inside.shape
     left = np.ones((views * candidates, candidates))
     for row in range(len(left)):
-        own = slice(boxes.hiders.start[row], boxes.hiders.start[row + 1])
-        left[row, boxes.hiders.item[own]] = boxes.hiders.value[own]
+        own = slice(boxes.occluders.start[row], boxes.occluders.start[row + 1])
+        left[row, boxes.occluders.item[own]] = boxes.occluders.value[own]
     return left.reshape(views, candidates, candidates)
 
 

@@ -20,15 +20,14 @@ from stseg.trajectories.smoother import smooth_places
 
 RATE = 8.0
 CONFIG = Config()
-GRID = Grid((-6.0, 6.0), (-6.0, 6.0), cell=0.25, planes=2)
 Path = Callable[[float], tuple[float, float]]
 """Where somebody is at a time in seconds, metres."""
 
 
-def open_area() -> Border:
-    """People come and go at the edges of the grid."""
-    edge = np.minimum(GRID.ground_x + 6, 6 - GRID.ground_x)
-    return Border(np.minimum(edge[None], np.minimum(GRID.ground_y + 6, 6 - GRID.ground_y)[:, None]), GRID)
+def open_area(side: float = 6.0) -> Border:
+    """People come and go at the edges of a square around the origin."""
+    grid = Grid((-side, side), (-side, side), cell=0.25, planes=2)
+    return Border(side - np.maximum(np.abs(grid.ground_x), np.abs(grid.ground_y)[:, None]), grid)
 
 
 BORDER = open_area()

@@ -61,7 +61,7 @@ ABOUT = {
     "trajectory": "one row per person and frame: metres on the ground, covariance in square metres, score in nats",
     "tracks": "one row per track: first and last frame, mean score in nats, median height and width in metres",
     "boxes": "one row per person, frame and view: pixels of the real image; view counts the cameras from 0",
-    "events": "birth, death, merge, split, hand-over, return, dropped, blind, crowd; other: the other track or 0",
+    "events": "birth, death, merge, split, hand-over, doubt, return, dropped, blind, crowd; other: a track or 0",
     "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts by view",
     "windows": "one row per window: half-open ranges of frames; energy of the cut in units of energy_quantum, nats",
     "rates": "one row per window and view: error rates of the view, 0..1, and its reprojection residual, metres",

@@ -11,8 +11,8 @@ from stseg.kernels.accelerate import wide_kernel
 from stseg.records.people import Explanation
 from stseg.records.tables import APPEARANCE, FEATURES
 
-_MINIMUM_VISIBILITY = 0.5
-"""Least share of a body that a view sees past others, for a row."""
+_LEAST_FOUND_SHARE = 0.5
+"""Least share of a whole body's detection rate in a view of boxes, for a row."""
 _MINIMUM_FOREGROUND = 0.5
 """Least likelihood of foreground at which a pixel's colour counts."""
 _SLICES = ((0.17, 0.5), (0.5, 0.95))
@@ -43,7 +43,7 @@ def appearance_rows(
     parts = []
     pictures = images or [None] * len(observations)
     for k, (observation, likely, image) in enumerate(zip(observations, evidence, pictures, strict=True)):
-        is_visible = explanation.people.visibility[k] >= _MINIMUM_VISIBILITY
+        is_visible = explanation.people.found_share[k] >= _LEAST_FOUND_SHARE
         rows = np.zeros(len(is_visible), APPEARANCE)
         rows["frame"], rows["view"] = frame, k
         rows["x"], rows["y"] = explanation.people.ground.T

@@ -37,7 +37,7 @@ def explained_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:
         refined.covariance,
         estimate.losses,
         score.view_evidence,
-        _visibility(estimate),
+        _found_share(estimate),
         candidate_prior_log_odds(estimate, members, score.track_index),
         score.track_index,
         refined.sizes,
@@ -73,26 +73,26 @@ def _outside_core(refined: Floats, members: Ints, problem: DetectionProblem) -> 
         ground[is_inside] = problem.ground[members[is_inside]]
 
 
-def _visibility(estimate: MapEstimate) -> Floats:
+def _found_share(estimate: MapEstimate) -> Floats:
     """Share of each member that each view sees past the others, float64 (view, member)."""
     members, evidence = estimate.members, estimate.problem.boxes
-    visibility = np.ones((len(estimate.evidence.views), len(members)))
+    found_share = np.ones((len(estimate.evidence.views), len(members)))
     boxes = iter(range(len(evidence.match)))
-    for row, view in zip(visibility, estimate.evidence.views, strict=True):
+    for row, view in zip(found_share, estimate.evidence.views, strict=True):
         if isinstance(view, BoxView):
             k = next(boxes)
             visible = np.prod(_visible_past(evidence, k, members), axis=1)
             row[:] = view.found_share(evidence.inside[k][members] * visible)
-    return visibility
+    return found_share
 
 
 def _visible_past(evidence: BoxEvidence, view: int, members: Ints) -> Floats:
     """Share of each member's pillar visible past each other member in a view with boxes, float64 (member, member)."""
-    hiders, candidates = evidence.hiders, evidence.inside.shape[1]
+    occluders, candidates = evidence.occluders, evidence.inside.shape[1]
     visible = np.ones((len(members), candidates))
     for row, i in zip(visible, (view * candidates + members).tolist(), strict=True):
-        hiders_of_one = slice(*hiders.start[i : i + 2].tolist())
-        row[hiders.item[hiders_of_one]] = hiders.value[hiders_of_one]
+        of_one = slice(*occluders.start[i : i + 2].tolist())
+        row[occluders.item[of_one]] = occluders.value[of_one]
     return visible[:, members]
 
 

@@ -80,7 +80,7 @@ class BoxEvidence(NamedTuple):
     -inf where there is no box."""
     boxes: Ints
     """int64 (view,): number of boxes of each view."""
-    hiders: RaggedArray
+    occluders: RaggedArray
     """Candidates who hide a part of one, rising, with the share that they leave; the row of a candidate in a view is
     view * candidates + candidate."""
     inside: Floats

@@ -33,8 +33,8 @@ from stseg.records.people import Explanation
 
 _PRIOR_WEIGHT = 2.0
 """w_0, weight of no error, seconds of one box: the errors of one box last for a second, and are as large."""
-_FREE_VISIBILITY = 0.95
-"""Least share of a body that is visible where it stands free, 0..1."""
+_FREE_SHARE = 0.95
+"""Least share of a whole body's detection rate where it stands free, 0..1."""
 _LARGEST_OFFSET = 0.15
 """Largest offset that is an error and not the box of another body: 2.5 standard deviations, shares of the height."""
 _DIFFERENCE = 0.05
@@ -81,7 +81,7 @@ class BoxBiasEstimate:
         for k, person, edges, _ in explained_boxes(explanation, views, observations, self._config):
             middle, lower = _linear_offsets(views[k], people.ground[person], people.height[person], edges)
             lower[:, 0] += self._corrected
-            free = people.visibility[k, person] >= _FREE_VISIBILITY
+            free = people.found_share[k, person] >= _FREE_SHARE
             counted = free & (np.abs(lower[:, 0]) < _LARGEST_OFFSET)
             for offset, share in ((lower, 1.0), (middle, 0.0)):
                 row = np.column_stack([np.full(len(person), share), -offset[:, 1:]])

@@ -88,8 +88,8 @@ def explained_boxes(
     people = explanation.people
     for k, (view, observation, owner) in enumerate(zip(views, observations, explanation.box_assignment, strict=True)):
         if isinstance(view, BoxView) and observation is not None and len(people):
-            trusted = people.evidence - people.view_evidence[k] >= config.minimum_evidence
-            box = np.flatnonzero((owner >= 0) & trusted[owner] & whole_boxes(observation.edges, view.camera.size))
+            supported = people.supported_without(k, config.minimum_evidence)
+            box = np.flatnonzero((owner >= 0) & supported[owner] & whole_boxes(observation.edges, view.camera.size))
             yield k, owner[box], observation.edges[box], observation.score[box]
 
 

@@ -127,14 +127,15 @@ def _fitted(variogram: Floats, count: Floats, lags: Ints, prior: LastingError, r
     return LastingError(*np.array(found, np.float64).reshape(-1, 3).T)
 
 
-def _fit(measured: Floats, count: Floats, shapes: Floats, cost: Floats) -> tuple[float, float, float]:
+def _fit(measured: Floats, number: Floats, shapes: Floats, cost: Floats) -> tuple[float, float, float]:
     """a^2, b^2 and tau of least squares to a variogram (lag,), whose errors are in proportion to itself.
 
-    `shapes` (tau, lag) is 1 - r^m, `cost` (tau,) what each tau costs beside the squared residuals.
+    `shapes` (tau, lag) is 1 - r^m, `cost` (tau,) what each tau costs beside the squared residuals;
+    `number` (lag,) are independent differences of each lag.
     """
     from scipy.optimize import nnls  # a start that fits nothing is faster without it
 
-    weight = np.sqrt(count) / np.maximum(measured, 1e-12)
+    weight = np.sqrt(number) / np.maximum(measured, 1e-12)
     fits = [nnls(np.column_stack([weight, weight * shape]), weight * measured) for shape in shapes]
     best = int(np.argmin(cost + [residual**2 for _, residual in fits]))
     white, lasting = fits[best][0].tolist()

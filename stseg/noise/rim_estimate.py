@@ -125,12 +125,12 @@ class RimEstimate:
         self.clutter.forget()
         for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
             if isinstance(view, PixelView) and observation is not None and len(people):
-                trusted = people.evidence - people.view_evidence[k] >= self._evidence
+                supported = people.supported_without(k, self._evidence)
                 widths = self._body.width_of(people.height)
                 first, spans, whole = view.whole_outlines(people.ground, people.height, widths)
                 counts = np.zeros((len(people), 3))
                 _fill_counts(first, spans, observation.raster, counts)
-                counted = trusted & (counts[:, 0] > WHOLE_SHARE * whole)
+                counted = supported & (counts[:, 0] > WHOLE_SHARE * whole)
                 self.shares.add(self.shares.seconds((counts[counted] / counts[counted, :1]).sum(0)), k)
                 self.clutter.add(
                     self.clutter.seconds(np.array([1.0, _clutter_of(first, spans, observation.raster)])), k

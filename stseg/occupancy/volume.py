@@ -28,7 +28,7 @@ from stseg.records.sparse_volume import SparseVolume
 
 _MAP_STEP = 8
 _UNOCCLUDED = 0.99
-"""Least visible share of a body that counts as unoccluded."""
+"""Least share of a whole body's detection rate at which it counts as unoccluded."""
 
 
 class _PreparedView(NamedTuple):
@@ -164,7 +164,7 @@ class Occupancy:
                 levels[i] = UNSEEN
                 continue
             if view.fit is not None:
-                confidence[i] = np.where(view.assignment.separate[:-1], 1.0, explanation.people.visibility[i])
+                confidence[i] = np.where(view.assignment.separate[:-1], 1.0, explanation.people.found_share[i])
             self._fill_view(i, view, cells, rates[i], levels[i], share[i])
         terms = np.stack([log_odds_terms(one) for one in rates])
         return FrameTerms(levels, share, cells.near_person, terms, weights, confidence)
@@ -210,7 +210,7 @@ class Occupancy:
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
         counts, rates = np.empty((2, len(fused.terms.weight), 3)), np.array(estimate.rates)
         trusted = (people.evidence - people.view_evidence >= config.minimum_evidence) & (
-            people.visibility >= _UNOCCLUDED
+            people.found_share >= _UNOCCLUDED
         )
         priors = self.config.effective_observations, self.prior
         fill_counts(fused.terms, fused.sums, inside, *cells.counted(), trusted, rates, *priors, *counts[::-1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Flags, Floats, Ints
 from stseg.records.candidates import Candidates
 from stseg.records.sizes import Sizes
 
@@ -31,8 +31,9 @@ class People:
     """float64 (n,): log-odds of the person by all views and the prior, given the others, nats."""
     view_evidence: Floats
     """float64 (view, n): part of each view, nats."""
-    visibility: Floats
-    """float64 (view, n): share of each body that a view sees past nearer people, 0..1."""
+    found_share: Floats
+    """float64 (view, n): share of a whole body's detection rate with which a view of boxes finds each, past nearer
+    people, 0..1; 1 in views of pixels."""
     prior: Floats
     """float64 (n,): part of the prior in the evidence, nats."""
     track_index: Ints
@@ -47,6 +48,28 @@ class People:
     def candidates(self) -> Candidates:
         """Their places and sizes."""
         return Candidates(self.ground, self.height, self.width)
+
+    def supported_without(self, view: int, least: float) -> Flags:
+        """Those for whom all evidence but one view's is some nats at least, bool (n,)."""
+        return np.asarray(self.evidence - self.view_evidence[view] >= least)
+
+    def at(self, chosen: Ints) -> People:
+        """The chosen of them, int64 (k,)."""
+        columns = {name: getattr(self, name)[..., chosen] for name in _BY_VIEW}
+        rows = {name: getattr(self, name)[chosen] for name in _BY_PERSON}
+        return People(**rows, **columns, sizes=self.sizes.at(chosen))
+
+    def joined_with(self, other: People) -> People:
+        """These, then others."""
+        columns = {name: np.concatenate([getattr(self, name), getattr(other, name)], 1) for name in _BY_VIEW}
+        rows = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _BY_PERSON}
+        return People(**rows, **columns, sizes=self.sizes.joined_with(other.sizes))
+
+
+_BY_VIEW = "view_evidence", "found_share"
+"""Fields (view, n)."""
+_BY_PERSON = "ground", "height", "width", "covariance", "evidence", "prior", "track_index"
+"""Fields (n, ...)."""
 
 
 @dataclass(frozen=True)

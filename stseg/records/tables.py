@@ -52,6 +52,11 @@ EVENT = columns("frame:<i8 kind:S12 id:<i8 other:<i8 reason:S96")
 """birth, death, merge, split, hand-over, doubt, return, dropped, blind, crowd; `other` is another track, 0 for none."""
 
 
+def reason_of(text: str) -> bytes:
+    """As much of a text as an event's reason holds, in whole characters."""
+    return text.encode()[: EVENT["reason"].itemsize].decode(errors="ignore").encode()
+
+
 def event_word(kind: str) -> str:
     """Word that people read for a kind of event: a merge, which begins an encounter, stands for all of it."""
     return "encounter" if kind == "merge" else kind

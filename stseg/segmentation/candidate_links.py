@@ -52,7 +52,7 @@ class LinkModel:
 
     frame_rate: float
     """Frames per second."""
-    patience: float
+    longest_absence: float
     """Longest absence inside a path, seconds."""
     prior_log_odds: float
     """Log of the prior odds of a person at a place, nats."""
@@ -75,8 +75,8 @@ class LinkModel:
         return start[kept], end[kept], bonus[kept]
 
     def _near(self, found: WindowCandidates) -> tuple[Ints, Ints]:
-        """Pairs within a patience and the gate: a window's pairs would take more memory than its volume."""
-        span = max(1, round(self.patience * self.frame_rate))
+        """Pairs within the longest absence and the gate: a window's pairs would take more memory than its volume."""
+        span = max(1, round(self.longest_absence * self.frame_rate))
         noise, speed = 2 * self.motion.position_noise**2, self.motion.speed_spread / self.frame_rate
         number = _LINKS_PER_CANDIDATE * len(found)
         while True:

@@ -16,6 +16,7 @@ from stseg.identities.review.weighed_doubts import weighed_doubts
 from stseg.io.config_file import parse_config
 from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.runfile.runs import Run, read_run
+from stseg.records.border import Border
 from stseg.reporting.charts import clock_time
 from stseg.reporting.page.review_page import Question, best_views, moment_picture, plan_film, review_page
 from stseg.tasks.correction import answered_before, is_solved_again
@@ -31,9 +32,7 @@ def doubtful_decisions(run: Run) -> list[Doubt]:
     """Doubtful decisions of a run, the most doubtful first; without those that were answered before."""
     if not len(run.trajectory):
         return []
-    grid = run.recording.rig.grid
-    border = np.array([[grid.x[0], grid.y[0]], [grid.x[1], grid.y[1]]])
-    found = find_doubts(run.trajectory, run.frame_rate, border)
+    found = find_doubts(run.trajectory, run.frame_rate, Border.of(run.recording.rig))
     if not is_solved_again(run):
         return found
     weighed = sorted(_weighed(run, found[:_WEIGHED_DECISIONS]), key=lambda one: (one.margin, one.first, one.track))

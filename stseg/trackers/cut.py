@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 from typing import ClassVar
 
@@ -36,7 +36,7 @@ from stseg.segmentation.patches import GroundPatches, mark_places, people_square
 from stseg.trackers.alternative_tracks import AcceptedAlternative, Reading
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import TrackPlaces, event_rows, fill_views, trajectory_rows
-from stseg.trackers.window_existence import TrackedFrame, WindowExistence, people_at
+from stseg.trackers.window_existence import TrackedFrame, WindowExistence
 from stseg.tracking.filter.prediction import earlier_detections, predicted_places, together
 from stseg.tracking.filter.track_filter import TrackFilter
 from stseg.tracking.windows.tracklets import form_tracklets
@@ -87,11 +87,11 @@ class CutTracker:
         before, people = one.fused.people, reading.explanation.people
 
         def revised() -> SparseVolume:
-            added = people_at(people, unmatched(people.ground, before.ground, SAME_PLACE))
+            added = people.at(unmatched(people.ground, before.ground, SAME_PLACE))
             return revised_volume(one.fused.volume, before.ground, people.ground, added, self.rig.grid, self.config)
 
         ghosts = reading.explanation.ghosts
-        return TrackedFrame(replace(one.fused, people=people, ghosts=ghosts, made=revised), reading.tracks)
+        return TrackedFrame(replace(one.fused, people=people, ghosts=ghosts, made=cache(revised)), reading.tracks)
 
     def predict(self, frame: int) -> PredictedTracks | None:
         """Predictions of all tracks for a frame; None for the first."""

@@ -29,7 +29,7 @@ class TrackedFrame:
     @cached_property
     def candidates(self) -> People:
         """Its people, then its ghosts: several windows ask for them."""
-        return _joined(self.fused.people, self.fused.ghosts)
+        return self.fused.people.joined_with(self.fused.ghosts)
 
     def detections(self) -> DetectionHistory:
         """Its detections."""
@@ -42,8 +42,8 @@ class WindowExistence:
 
     def __init__(self, rig: Rig, config: Config, solver: Solver) -> None:
         self.grid, self.solver, self.config = rig.grid, solver, config
-        patience, prior = config.tracking.interpolation_gap, config.detection.prior_log_odds
-        links = LinkModel(rig.frame_rate, patience, prior, config.motion, config.body)
+        longest_absence, prior = config.tracking.interpolation_gap, config.detection.prior_log_odds
+        links = LinkModel(rig.frame_rate, longest_absence, prior, config.motion, config.body)
         radius = config.occupancy.person_radius
         self.model = ExistenceModel(links, radius, Border.of(rig), config.detection, config.body)
 
@@ -65,9 +65,9 @@ class WindowExistence:
         fused, number = one.fused, len(one.tracks)
         real = tracks > 0
         candidates = replace(one.candidates, evidence=log_odds)
-        people, ghosts = people_at(candidates, np.flatnonzero(real)), people_at(candidates, np.flatnonzero(~real))
+        people, ghosts = candidates.at(np.flatnonzero(real)), candidates.at(np.flatnonzero(~real))
         if not real[:number].all() or real[number:].any():
-            added = people_at(candidates, number + np.flatnonzero(real[number:]))
+            added = candidates.at(number + np.flatnonzero(real[number:]))
             before, volume = fused.people.ground, fused.volume
             made = revised_volume(volume, before, people.ground, added, self.grid, self.config)
             fused = replace(fused, made=made)
@@ -109,37 +109,3 @@ def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> N
     """Give a candidate the track of its neighbour on the path, unless another has it in that frame."""
     if tracks[to] == 0 and tracks[source] > 0 and not (tracks[found.frame == found.frame[to]] == tracks[source]).any():
         tracks[to] = tracks[source]
-
-
-def _joined(one: People, other: People) -> People:
-    def both(name: str, axis: int = 0) -> Floats:
-        return np.concatenate([getattr(one, name), getattr(other, name)], axis)
-
-    return People(
-        both("ground"),
-        both("height"),
-        both("width"),
-        both("covariance"),
-        both("evidence"),
-        both("view_evidence", 1),
-        both("visibility", 1),
-        both("prior"),
-        both("track_index").astype(np.int64),
-        one.sizes.joined_with(other.sizes),
-    )
-
-
-def people_at(people: People, chosen: Ints) -> People:
-    """The chosen of them, int64 (k,)."""
-    return People(
-        people.ground[chosen],
-        people.height[chosen],
-        people.width[chosen],
-        people.covariance[chosen],
-        people.evidence[chosen],
-        people.view_evidence[:, chosen],
-        people.visibility[:, chosen],
-        people.prior[chosen],
-        people.track_index[chosen],
-        people.sizes.at(chosen),
-    )

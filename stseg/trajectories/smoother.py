@@ -21,13 +21,12 @@ from stseg.geometry.distances import distances
 from stseg.noise.lasting_error import PLACE_ERROR
 from stseg.records.tables import TRAJECTORY
 from stseg.tracking.filter.motion_model import augmented_noise, augmented_transition
+from stseg.tracking.filter.prediction import DRIFT_SPEED
 from stseg.tracking.filter.tentative_tracks import EXCLUSION_RADIUS
 from stseg.tracking.row_groups import rows_of_tracks
 
 _ROWS_AT_ONCE = 8192
 """Rows that are smoothed at a time: each takes 2 kB meanwhile, and of a day there are millions."""
-_DRIFT_PER_FRAME = 0.1
-"""Growth of a place's standard deviation a frame away from the nearest detection, metres."""
 
 
 def filled_gaps(trajectory: Rows, interpolated: Rows) -> Rows:
@@ -50,7 +49,7 @@ def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfi
     step, same = np.diff(trajectory["frame"][order]), np.diff(trajectory["id"][order]) == 0
     gaps = np.flatnonzero(same & (step > 1) & (step <= config.interpolation_gap * frame_rate + 1))
     ends = zip(trajectory[order[gaps]], trajectory[order[gaps + 1]], strict=True)
-    return np.concatenate([np.zeros(0, TRAJECTORY), *(_between(before, after) for before, after in ends)])
+    return np.concatenate([np.zeros(0, TRAJECTORY), *(_between(before, after, frame_rate) for before, after in ends)])
 
 
 def apart_from(rows: Rows, trajectory: Rows) -> Rows:
@@ -65,16 +64,16 @@ def apart_from(rows: Rows, trajectory: Rows) -> Rows:
     return np.asarray(rows[free])
 
 
-def _between(before: np.void, after: np.void) -> Rows:
+def _between(before: np.void, after: np.void, frame_rate: float) -> Rows:
     frames = np.arange(before["frame"] + 1, after["frame"])
     filled = np.zeros(len(frames), TRAJECTORY)
     fraction = (frames - before["frame"]) / (after["frame"] - before["frame"])
     filled["frame"], filled["id"] = frames, before["id"]
     for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "score"):
         filled[name] = before[name] + fraction * (after[name] - before[name])
-    away = np.minimum(frames - before["frame"], after["frame"] - frames)
-    filled["xx"] += (_DRIFT_PER_FRAME * away) ** 2
-    filled["yy"] += (_DRIFT_PER_FRAME * away) ** 2
+    away = np.minimum(frames - before["frame"], after["frame"] - frames) / frame_rate
+    filled["xx"] += (DRIFT_SPEED * away) ** 2
+    filled["yy"] += (DRIFT_SPEED * away) ** 2
     filled["height"] = filled["width"] = np.nan
     filled["views"] = before["views"]
     return filled

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Boxes, Observation, Rows, ViewEvidence
-from stseg.records.tables import EVENT
+from stseg.records.tables import EVENT, reason_of
 from stseg.view_health.view_failures import ViewFailures
 
 _NO_EVIDENCE = "is frozen, or its light changes: excluded"
@@ -47,7 +47,7 @@ class ExcludedViews:
             elif since is not None and not excluded and observations[k] is not None:
                 self._since[k] = None
                 reasons.append(f"camera {name} counts again, after {frame - since} frames")
-        return np.array([(frame, b"blind", 0, 0, reason.encode()) for reason in reasons], EVENT)
+        return np.array([(frame, b"blind", 0, 0, reason_of(reason)) for reason in reasons], EVENT)
 
 
 def _reason(evidence: ViewEvidence, knocked: bool) -> str:
@@ -127,7 +127,7 @@ class BlindViews:
             blind = [frame for frame in frames if k in self._missing.get(frame, ())]
             if blind:
                 events.append((blind[0], f"camera {name} showed nothing in {len(blind)} of {len(frames)} frames"))
-        return np.array([(frame, b"blind", 0, 0, text.encode()) for frame, text in events], EVENT)
+        return np.array([(frame, b"blind", 0, 0, reason_of(text)) for frame, text in events], EVENT)
 
     def forget(self, before: int) -> None:
         """Discard the records of frames before frame `before`."""

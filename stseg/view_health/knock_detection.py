@@ -65,7 +65,7 @@ def _step(agreement: Floats, view: int, least: float) -> Knock | None:
     if len(rows) < 2 * _LEAST_FRAMES:
         return None
     # Outlier frames must not look like steps.
-    centre, wide = np.median(relative[rows]), 6 * _spread(relative[rows])
+    centre, wide = np.median(relative[rows]), 6 * _spread(relative[rows]) or np.inf
     values = np.clip(relative[rows], centre - wide, centre + wide)
     cut = _cut(values)
     before, after = values[:cut], values[cut:]

@@ -100,11 +100,11 @@ def _is_separate(ends: Floats, view: View) -> Flags:
 
 
 def _by_pixels(people: Candidates, right: Floats, view: PixelView, observation: ViewObservation) -> Floats:
-    """Residual of each person by pixels, float64 (n,), metres along `right` (n, 2)."""
+    """Residual of each person by pixels, float64 (n,), metres along `right` (n, 2); nan where no shift shows them."""
     places = people.ground[:, None] + _SHIFTS[:, None] * right[:, None]
     heights, widths = (np.repeat(size[:, None], len(_SHIFTS), 1) for size in (people.height, people.width))
     unassigned, number = np.full(view.shape, -1, np.int16), np.zeros(len(people), np.int64)
     sums, area = view.open_sums(observation.raster, unassigned, number, view.tried(places, heights, widths))
     score = sums / np.maximum(area, 1.0)
     weight = np.exp(score - score.max(1, keepdims=True))
-    return np.asarray(weight @ _SHIFTS / weight.sum(1))
+    return np.where(score.max(1) > 0, weight @ _SHIFTS / weight.sum(1), np.nan)

@@ -10,6 +10,7 @@ the time of a frame and person, and is forgotten slowly for the usual J of the v
 each of several spans. A view begins to fail when its J of one span is less than 0.7 of the usual one, and that is no
 chance: the difference is more than 4.6 of its standard deviations. The deviation is what the means over as many
 measurements have shown while the view was sound, so a detector that misses people in single frames excludes no view.
+J of the shortest span must be below 0.7 of the usual one, too.
 A low J and its deviations count in the usual ones as soon as it has come back without a failure.
 A failing view is excluded until J of the shortest span has come back. The usual J and the deviation stand while it
 fails. The usual J counts in J now where few people were measured of late, so a view without people comes back by
@@ -110,16 +111,14 @@ class ViewFailures:
     def learn(self, explanation: Explanation, views: Sequence[DetectorView], observations: ViewObservations) -> bool:
         """Count one frame by its explanation; whether more views are excluded from it now."""
         people = explanation.people
-        evidence = np.nan_to_num(people.view_evidence)
-        supports = evidence >= _SUPPORT
+        supports = people.view_evidence >= _SUPPORT
         support = supports.sum(0)
         for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
             if observation is None:
                 continue
-            certain = (people.evidence - evidence[k] >= self._config.minimum_evidence) & (
-                support - supports[k] >= OTHER_VIEWS
-            )
-            self._count(k, *informedness(explanation.pixel_assignment[k], certain, view.foreground(observation)))
+            supported = people.supported_without(k, self._config.minimum_evidence)
+            supported &= support - supports[k] >= OTHER_VIEWS
+            self._count(k, *informedness(explanation.pixel_assignment[k], supported, view.foreground(observation)))
         begins = self.failing & ~self.excluded
         self.excluded |= begins
         return bool(begins.any())

@@ -87,7 +87,7 @@ def test_gains_are_offsets_and_who_is_covered_has_no_looks() -> None:
     assert np.ptp(offset) < 0.25 and abs(offset.mean() - np.log(1 / 0.6)) < 0.2
     views, likely = painted()
     hidden = explained()
-    hidden.people.visibility[1, 0] = 0.2
+    hidden.people.found_share[1, 0] = 0.2
     rows = appearance_rows(7, hidden, TABLES, None, views, likely)
     assert not ((rows["view"] == 1) & (rows["x"] == STANDING[0, 0])).any()
     assert ((rows["view"] == 1) & (rows["x"] == STANDING[1, 0])).any()

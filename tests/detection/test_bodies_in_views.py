@@ -21,7 +21,7 @@ from stseg.bodies.pillars import BodyTable
 from stseg.bodies.views import PixelView, ViewObservation
 from stseg.commands.simulate import simulate
 from stseg.detection.detector import Detector
-from stseg.detection.evidence.occlusion import hiders_of
+from stseg.detection.evidence.occlusion import occluders_of
 from stseg.detection.prior import Prior
 from stseg.detection.problem import BoxEvidence, no_rows
 from stseg.io.track_csv import read_tracks_csv
@@ -94,14 +94,14 @@ def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     fill_inside(bodies, WIDTH, HEIGHT, inside)
     views, away, sizes = np.stack([bodies] * 3), np.stack([distance] * 3), np.array([[WIDTH, HEIGHT]] * 3)
     blind = np.array([False, True, False])
-    before = hiders_of(views[:, :base].copy(), away[:, :base].copy(), sizes, blind, no_rows(), 0)
-    hiders = hiders_of(views, away, sizes, blind, before, base)
-    left = reference.left_by_all(BoxEvidence(np.empty(0), np.zeros(0, np.int64), hiders, np.empty((3, len(bodies)))))
+    before = occluders_of(views[:, :base].copy(), away[:, :base].copy(), sizes, blind, no_rows(), 0)
+    occluders = occluders_of(views, away, sizes, blind, before, base)
+    left = reference.left_by_all(BoxEvidence(np.empty(0), np.zeros(0, np.int64), occluders, np.empty((3, len(bodies)))))
     np.testing.assert_allclose(inside, [reference.inside(b, WIDTH, HEIGHT) for b in bodies], atol=1e-12)
     hidden = [[reference.cover(bodies, distance, WIDTH, HEIGHT, i, k) for k in everyone] for i in everyone]
     none_hidden = np.zeros_like(hidden)
     np.testing.assert_allclose(1 - left, np.stack([hidden, none_hidden, hidden]), atol=1e-12)
-    assert all((np.diff(hiders.item[a:b]) > 0).all() for a, b in itertools.pairwise(hiders.start))
+    assert all((np.diff(occluders.item[a:b]) > 0).all() for a, b in itertools.pairwise(occluders.start))
 
 
 @pytest.mark.parametrize("step", [1, 3])

@@ -52,7 +52,7 @@ def test_two_people_apart(kind: str) -> None:
     found = explanation.people
     np.testing.assert_allclose(found.height[index], standing[:, 2], atol=0.11)
     assert (found.evidence > 5).all() and (found.view_evidence > 0.5).all()
-    assert found.view_evidence.shape == found.visibility.shape == (4, 2)
+    assert found.view_evidence.shape == found.found_share.shape == (4, 2)
     spread = np.linalg.eigvalsh(found.covariance)
     assert ((spread > 0) & (spread < 0.15**2)).all()
     assert (explanation.ghosts.evidence < 0).all()
@@ -102,6 +102,18 @@ def test_pixels_boxes_and_tracks_are_assigned_to_people(kind: str) -> None:
     assert min(first, second) > FEW_HEIGHTS.prior_log_odds > birth + 3
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_frame_without_views_detects_nobody(kind: str) -> None:
+    detector, expected = room_detector(kind), expecting((0.4, -0.3))
+    learned, seen = detector.new_estimates(), evidence_of(kind, room().cameras, people((0.4, -0.3)))
+    assert len(detector.explain_next(learned, 0, seen, expected).people) == 1
+    blind = detector.explain_next(learned, 1, [None] * 4, expected)
+    assert not len(blind.people) and not len(blind.ghosts) and learned.frames == 2
+    seen[1] = None
+    found = detector.explain_next(learned, 2, seen, expected).people
+    assert len(found) == 1 and found.view_evidence[1, 0] == 0
+
+
 @compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_who_is_hidden_by_others_in_some_views_stays(kind: str) -> None:
@@ -114,7 +126,7 @@ def test_who_is_hidden_by_others_in_some_views_stays(kind: str) -> None:
     nearest, far = assert_found(explanation, standing)
     if kind == "boxes":
         assert explanation.box_assignment[0].tolist() == [nearest]
-        assert explanation.people.visibility[0, far] < 0.3 < 0.9 < explanation.people.visibility[0, nearest]
+        assert explanation.people.found_share[0, far] < 0.3 < 0.9 < explanation.people.found_share[0, nearest]
         assert explanation.people.view_evidence[0, far] > -1.0  # a box that is not expected is not missed
     hidden = people((0.0, 1.0, 1.6))
     nearer = people((-0.92, -0.18, 1.8), (0.93, -0.17, 1.8))  # on the lines to the first two cameras
@@ -186,7 +198,7 @@ def test_a_track_stays_though_one_view_alone_shows_it() -> None:
     explanation = room_detector("boxes").explain(views, expecting((0.03, -0.02, 1.6), *tracked))
     index = assert_found(explanation, standing)
     assert explanation.people.track_index[index].tolist() == [0, 1, 2, 3]
-    assert (explanation.people.visibility[:, index[0]] < [0.5, 0.5, 0.5, 1.1]).all()
+    assert (explanation.people.found_share[:, index[0]] < [0.5, 0.5, 0.5, 1.1]).all()
     assert_found(room_detector("boxes").explain(views, expecting(*tracked)), nearer)
 
 
@@ -239,7 +251,7 @@ def test_the_same_frame_twice(kind: str) -> None:
     used = room_detector(kind)
     used.explain(evidence_of(kind, rig.cameras, second), None)
     again = used.explain(evidence_of(kind, rig.cameras, first), None)
-    for name in ("ground", "height", "covariance", "evidence", "view_evidence", "visibility", "prior", "track_index"):
+    for name in ("ground", "height", "covariance", "evidence", "view_evidence", "found_share", "prior", "track_index"):
         np.testing.assert_array_equal(getattr(new.people, name), getattr(again.people, name))
         np.testing.assert_array_equal(getattr(new.ghosts, name), getattr(again.ghosts, name))
 

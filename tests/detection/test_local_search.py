@@ -315,7 +315,7 @@ def test_no_set_becomes_less_likely(seed: int) -> None:
 
 def box_tables(estimate: MapEstimate) -> list[Floats | Ints]:
     boxes = estimate.problem.boxes
-    return [boxes.match, boxes.boxes, *boxes.hiders, boxes.inside]
+    return [boxes.match, boxes.boxes, *boxes.occluders, boxes.inside]
 
 
 @pytest.mark.parametrize("seed", range(3))

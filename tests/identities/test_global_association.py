@@ -173,8 +173,11 @@ def test_people_who_differ_are_far_apart_along_the_axes(name: str) -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_numbers_that_say_nothing_of_the_person_add_nothing(seed: int) -> None:
     rows = walkers()
-    found = learned(rows, appearance(rows, rows["id"], 1.0, 0.0, seed))
-    assert found.value.shape == (len(rows), 0) and len(found.model.spread) == 0
+    for columns in (FEATURES, 1, 0):
+        looks = appearance(rows, rows["id"], 1.0, 0.0, seed)
+        looks["features"][:, columns:] = 0.0
+        found = learned(rows, looks)
+        assert found.value.shape == (len(rows), 0) and len(found.model.spread) == 0
 
 
 def drifting(rows: Rows, noise: float, differ: float, frames: int, name: str) -> Rows:

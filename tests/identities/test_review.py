@@ -11,6 +11,7 @@ import pytest
 from browser import CHROMIUM, chromium
 from checks import Captured, cases, in_ci, refused
 from run_files import table_of, write_small_run
+from simulated_people import open_area
 
 from stseg import InputError, read_run
 from stseg.arrays import Floats, Rows
@@ -24,7 +25,7 @@ from stseg.io.answers import read_answers
 from stseg.records.tables import TRACK, TRAJECTORY, Tracks
 from stseg.tasks.review import question_words
 
-BORDER = np.array([[-5.0, -5.0], [5.0, 5.0]])
+BORDER = open_area(5.0)
 
 
 def walk(identity: int, first: int, x: Floats, y: float, height: float, score: float = 9.0) -> Rows:
@@ -155,6 +156,8 @@ def test_swap_join_split_delete_and_name() -> None:
     assert of(solved, 3, 49, 50) == [3, 4]
     solved = solve_corrections(three, [Answer("a", "delete", 3, frame=50), Answer("b", "delete", 1)])
     assert of(solved, 3, 49, 50) == [3, 0] and of(solved, 1, 10) == [0]
+    of_one_alone = solve_corrections(three, [Answer("a", "split", 3, 9, 50), Answer("b", "delete", 1, 8)])
+    assert of(of_one_alone, 3, 50) != of(of_one_alone, 3, 49) and of(of_one_alone, 1, 0) == [0]
     assert of(solve_corrections(three, []), 0, 5) == [0]
 
 

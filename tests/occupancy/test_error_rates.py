@@ -220,7 +220,7 @@ def test_blind_single_and_hiding_views_learn_nothing() -> None:
     hidden = np.array([[0.5] * len(explanation.people), *np.ones((3, len(explanation.people)))])
     unseen = replace(
         explanation,
-        people=replace(explanation.people, visibility=hidden),
+        people=replace(explanation.people, found_share=hidden),
         box_assignment=(np.zeros(0, np.int64), *explanation.box_assignment[1:]),
     )
     running = fusion.new_error_rates()

@@ -292,7 +292,7 @@ def test_explained_and_hidden_evidence_speaks_less_elsewhere() -> None:
     rig = rig_of(corner_cameras()[:1])
     occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS, BODY)
     explanation = explained(rig, people((0.0, 0.0)))
-    half = replace(explanation.people, visibility=np.array([[0.5]]))
+    half = replace(explanation.people, found_share=np.array([[0.5]]))
     nothing = evidence_of("boxes", rig.cameras, people())
     whole_says = occupancy.fuse(nothing, explanation).dense()
     half_says = occupancy.fuse(nothing, replace(explanation, people=half)).dense()

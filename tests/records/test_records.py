@@ -16,7 +16,7 @@ from stseg.records import cell_reliability
 from stseg.records.border import Border
 from stseg.records.forgetting import Forgetting
 from stseg.records.sizes import Sizes
-from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.records.tables import TRAJECTORY, Tracks, reason_of
 from stseg.records.track_heights import with_heights
 
 
@@ -105,6 +105,10 @@ def test_a_track_has_the_median_of_sizes_that_are_measured() -> None:
     rows = table_of(TRAJECTORY, frame=[0, 0, 1, 2, 3], id=[1, 2, 1, 1, 1], height=[1.6, np.nan, np.nan, 1.7, 1.75])
     assert with_heights(rows)["height"] == pytest.approx([1.6, BODY_HEIGHT, 1.7, 1.7, 1.75])
     np.testing.assert_array_equal(Tracks(rows).summary()["height"], np.array([1.7, np.nan], np.float32))
+
+
+def test_a_reason_ends_with_a_whole_character() -> None:
+    assert reason_of("camera " + 31 * "\u4e2d") == b"camera " + 29 * "\u4e2d".encode() and reason_of("a") == b"a"
 
 
 def test_points_have_the_distance_of_their_cell() -> None:

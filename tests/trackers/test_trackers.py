@@ -1,6 +1,10 @@
 """The trackers on crafted scenes: every frame committed once, the same whatever part is run, labels that say who."""
 
+import re
+import sys
 from dataclasses import replace
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -88,6 +92,21 @@ def test_nearest_person_within_reach() -> None:
     asked = np.array([[[0.1, 0.0], [0.6, 0.0]], [[0.5, 2.0], [1.0, 0.4]]])
     assert nearest_person(asked, standing, 0.4).tolist() == [[0, 1], [-1, 1]]
     assert nearest_person(asked, np.zeros((0, 2)), 0.4).tolist() == [[-1, -1], [-1, -1]]
+
+
+def test_parts_that_the_page_on_contributing_adds_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "development" / "contributing.md").read_text("utf-8")
+    added = ModuleType("added")
+    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), vars(added))
+    monkeypatch.setitem(sys.modules, "added", added)
+    monkeypatch.setitem(TRACKERS, "nearest", "added:NearestTracker")
+    rows = rows_of(run("nearest", 0, 20))
+    assert len(rows) == 40 and len(np.unique(rows["id"])) == 2
+    np.savetxt(tmp_path / "cam1.txt", np.eye(3, 4))
+    (camera,) = added.read_plain([tmp_path / "cam1.txt"])
+    assert camera.name == "cam1"
+    added.write_json_lines(tmp_path / "rows", SimpleNamespace(trajectory=rows))
+    assert len((tmp_path / "rows").read_text("utf-8").splitlines()) == 40
 
 
 @pytest.mark.parametrize("tracker", COLOURLESS)

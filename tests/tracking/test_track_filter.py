@@ -79,7 +79,7 @@ def test_a_posterior_that_says_nothing_new_changes_nothing() -> None:
     after = track.corrected(12, unchanged_place(track), NOTHING, NOTHING)
     np.testing.assert_allclose(after.state, track.state)
     np.testing.assert_allclose(after.covariance, track.covariance)
-    assert (after.track, after.last_seen, after.odds) == (3, 12, track.odds)
+    assert (after.track, after.last_seen, after.log_odds) == (3, 12, track.log_odds)
     assert (after.height, after.width) == pytest.approx((track.height, track.width))
 
 

@@ -133,6 +133,8 @@ def test_two_cameras_by_time_harmless_steps_and_wild_frames() -> None:
     agreement[300:, 0] -= 5.0
     agreement[600:, 3] -= 5.0
     assert [(knock.view, round(knock.frame, -2)) for knock in find_knocks(agreement)] == [(0, 300), (3, 600)]
+    (knock,) = find_knocks(np.where(np.arange(100) < 70, 0.0, -5.0)[:, None] * [1.0, 0.0, 0.0])
+    assert (knock.view, knock.frame) == (0, 70)
     agreement = 0.01 * correlated(400, 3, 5)
     agreement[200:, 1] -= 0.2
     assert len(find_knocks(agreement)) == 1 and find_knocks(agreement, least=0.5) == []

@@ -48,7 +48,7 @@ WHOLE: dict[str, tuple[str, Any]] = {
     "bias of boxes": ("stseg.noise.box_bias_estimate.BoxBiasEstimate.learn", lambda *_: None),
     "population": ("stseg.noise.population_estimate.PopulationEstimate.learn", lambda *_: None),
     "rims of the first frame": (f"{_DETECTOR}.Detector._learn_first_rims", lambda *_: None),
-    "tentative tracks": ("stseg.tracking.filter.track_filter.tentative_odds", lambda *_: {}),
+    "tentative tracks": ("stseg.tracking.filter.track_filter.tentative_log_odds", lambda *_: {}),
 }
 """Mechanisms of whole runs: what is patched, and with what."""
 FINAL: dict[str, tuple[str, Any]] = {

@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import Floats, Singles
 from stseg.bodies.box_fit import fill_inside, fill_match
 from stseg.bodies.views import BoxView, PixelView, View, ViewObservations
-from stseg.detection.evidence.occlusion import hiders_of
+from stseg.detection.evidence.occlusion import occluders_of
 from stseg.detection.evidence.overlap import overlaps_of
 from stseg.detection.problem import BoxEvidence, PixelEvidence, no_rows
 from stseg.records.candidates import Candidates
@@ -89,8 +89,9 @@ def box_evidence(
             fill_match(edges, of_view, match[k, first:])
             fill_inside(edges, of_view.width, of_view.height, inside[k, first:])
     is_blind = np.array([observation is None for _, observation in chosen], bool)
-    hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, base.hiders if base else no_rows(), first)
-    return BoxEvidence(match, boxes, hiders, inside)
+    before = base.occluders if base else no_rows()
+    occluders = occluders_of(bodies.edges, bodies.distance, sizes, is_blind, before, first)
+    return BoxEvidence(match, boxes, occluders, inside)
 
 
 def _no_boxes(candidates: int) -> BoxEvidence:

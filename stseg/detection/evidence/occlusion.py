@@ -17,7 +17,7 @@ _INSET = 0.1
 
 
 @kernel
-def hiders_of(
+def occluders_of(
     bodies: Floats, distance: Floats, sizes: Floats, is_blind: Flags, base: RaggedArray, base_candidates: int
 ) -> RaggedArray:
     """Occluders of each candidate, rising, with the share that each leaves visible of the box inside the image.
@@ -40,13 +40,13 @@ def hiders_of(
                     item[number], value[number] = base.item[k], base.value[k]
                     number += 1
             if not is_blind[view]:
-                number = _add_hiders(i, first, bodies[view], distance[view], sizes[view], item, value, number)
+                number = _add_occluders(i, first, bodies[view], distance[view], sizes[view], item, value, number)
             start[view * candidates + i + 1] = number
     return RaggedArray(start, item[:number].copy(), value[:number].copy())
 
 
 @part
-def _add_hiders(
+def _add_occluders(
     i: int, first: int, bodies: Floats, distance: Floats, size: Floats, item: Ints, value: Floats, number: int
 ) -> int:
     """Add to the first `number` items the occluders of i among the candidates from `first` on; their number."""

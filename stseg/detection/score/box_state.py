@@ -42,9 +42,9 @@ class BoxState(NamedTuple):
     """int64 (k,): the members of the set among the candidates of each box, rising, from the place of the first on."""
     members: Ints
     """int64 (view * box,): number of these of each box."""
-    hidden: RaggedArray
+    occluded: RaggedArray
     """Candidates that one hides in part, with the share that is left."""
-    hiders: RaggedArray
+    occluders: RaggedArray
     """Candidates who hide a part of one, with the share that they leave."""
     visible: Floats
     """float64 (view * candidate,): share of the candidate's pillar inside the image."""
@@ -67,7 +67,8 @@ def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
     for view in range(views):
         for i in range(candidates):
             row = view * candidates + i
-            missing_cost[row] = missing_box_cost(evidence.inside[view, i], parameters)
+            inside = evidence.inside[view, i]
+            missing_cost[row] = missing_box_cost(inside, parameters) if inside > 0 else 0.0
             for b in range(evidence.boxes[view]):
                 if evidence.match[view, i, b] > threshold:
                     fit[row] += 1
@@ -96,8 +97,8 @@ def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
         fitting,
         np.empty(len(fitting.item), np.int64),
         np.zeros(views * boxes, np.int64),
-        _hidden_by(evidence.hiders, views, candidates),
-        evidence.hiders,
+        _occluded_by(evidence.occluders, views, candidates),
+        evidence.occluders,
         evidence.inside.copy().reshape(-1),
         missing_cost,
         np.empty(candidates + 1, np.int64),
@@ -107,18 +108,18 @@ def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
 
 
 @kernel
-def _hidden_by(hiders: RaggedArray, views: int, candidates: int) -> RaggedArray:
-    """Candidates hidden by each, rising, from the rows of those who hide each."""
+def _occluded_by(occluders: RaggedArray, views: int, candidates: int) -> RaggedArray:
+    """Candidates occluded by each, rising, from the rows of those that occlude each."""
     number = np.zeros(views * candidates, np.int64)
     for view in range(views):
-        for k in range(hiders.start[view * candidates], hiders.start[(view + 1) * candidates]):
-            number[view * candidates + hiders.item[k]] += 1
-    hidden, place = ragged_array(number)
+        for k in range(occluders.start[view * candidates], occluders.start[(view + 1) * candidates]):
+            number[view * candidates + occluders.item[k]] += 1
+    occluded, place = ragged_array(number)
     for view in range(views):
         for i in range(candidates):
-            for k in range(hiders.start[view * candidates + i], hiders.start[view * candidates + i + 1]):
-                append(hidden, place, view * candidates + hiders.item[k], i, hiders.value[k])
-    return hidden
+            for k in range(occluders.start[view * candidates + i], occluders.start[view * candidates + i + 1]):
+                append(occluded, place, view * candidates + occluders.item[k], i, occluders.value[k])
+    return occluded
 
 
 @part
@@ -174,10 +175,10 @@ def _score_alone(row: int, inside: Flags, state: BoxState, parameters: ScorePara
 def link(view: int, i: int, inside: Flags, state: BoxState) -> int:
     """Fill `state.linked` with i and the members with parts of the score that may depend on i; returns their number."""
     linked, is_linked, candidates = state.linked, state.is_linked, len(state.is_linked)
-    fits, fitting, hidden = state.fits, state.fitting, state.hidden
+    fits, fitting, occluded = state.fits, state.fitting, state.occluded
     linked[0], number, row = i, 1, view * candidates + i
-    for k in range(hidden.start[row], hidden.start[row + 1]):
-        j = hidden.item[k]
+    for k in range(occluded.start[row], occluded.start[row + 1]):
+        j = occluded.item[k]
         if inside[j]:
             linked[number], is_linked[j] = j, True
             number += 1
@@ -220,12 +221,12 @@ def _score_of_linked(
 @part
 def _missing_cost(row: int, inside: Flags, state: BoxState, parameters: ScoreParameters) -> float:
     """Cost of a missing box of a candidate that members may hide in part, nats."""
-    visible, is_hidden = state.visible[row], False
-    for k in range(state.hiders.start[row], state.hiders.start[row + 1]):
-        if inside[state.hiders.item[k]]:
-            visible *= state.hiders.value[k]
-            is_hidden = True
-    return missing_box_cost(visible, parameters) if is_hidden else float(state.missing_cost[row])
+    visible, is_occluded = state.visible[row], False
+    for k in range(state.occluders.start[row], state.occluders.start[row + 1]):
+        if inside[state.occluders.item[k]]:
+            visible *= state.occluders.value[k]
+            is_occluded = True
+    return missing_box_cost(visible, parameters) if is_occluded else float(state.missing_cost[row])
 
 
 @part

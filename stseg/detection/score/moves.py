@@ -70,10 +70,10 @@ def _forget(i: int, state: SetState) -> None:
     for r in range(linked_tracks(i, state.inside, tracks)):
         _forget_row(whole, tracks.reached[r], tracks.followers, state)
     for view in range(boxes.views):
-        _forget_row(view, view * candidates + i, boxes.hidden, state)
+        _forget_row(view, view * candidates + i, boxes.occluded, state)
         for a in range(link(view, i, state.inside, boxes)):
             row = view * candidates + boxes.linked[a]
-            _forget_row(view, row, boxes.hiders, state)
+            _forget_row(view, row, boxes.occluders, state)
             for k in range(boxes.fits.start[row], boxes.fits.start[row + 1]):
                 _forget_row(view, view * boxes.boxes + boxes.fits.item[k], boxes.fitting, state)
 

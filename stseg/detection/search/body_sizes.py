@@ -12,7 +12,7 @@ the weights those of `stseg.bodies.views`, `observations` the effective number o
 HW12 averages over R, which never rewards a pillar for covering more of the person. Its weight of the background is
 illegible; here it makes a pixel that is half foreground say nothing, so that edges lie where people's do. Of people in
 boxes alone the height is found with the place (`refine`), and no width: a box's sides show arms and
-strides. M step: the frame is searched again with the sizes found (`stseg.detection.detector`).
+strides. M step: the frame is searched again with the sizes found (`stseg.detection.search.frame_search`).
 """
 
 from collections.abc import Sequence

@@ -50,7 +50,7 @@ class FrameSearch:
     def whole(
         self, estimate: MapEstimate, proposals: Candidates | None = None, ground: OpenGround = EVERYWHERE
     ) -> MapEstimate:
-        """All rounds, from the predicted tracks on; proposals join the lattice in the first one.
+        """All rounds, from an estimate on; proposals join the lattice in the first one.
 
         People join, move and leave on open ground alone, by default everywhere.
         """

@@ -52,8 +52,8 @@ def mark_interacting(i: int, state: SetState, linked: Flags) -> None:
         row = view * candidates + i
         for k in range(boxes.fits.start[row], boxes.fits.start[row + 1]):
             _mark_row(view * boxes.boxes + boxes.fits.item[k], boxes.fitting, linked)
-        _mark_row(row, boxes.hidden, linked)
-        _mark_row(row, boxes.hiders, linked)
+        _mark_row(row, boxes.occluded, linked)
+        _mark_row(row, boxes.occluders, linked)
 
 
 @part

@@ -101,8 +101,9 @@ class _Pairs:
     def of(cls, axes: Axes, value: Floats, people: Sequence[Ints], probes: _Probes) -> _Pairs:
         """Pairs by the rows of each person, and of each probe."""
         y, size = axes.of(value), len(axes.spread)
-        sums = [np.array([y[rows].sum(axis=0) for rows in part]).reshape(-1, size) for part in (people, probes.rows)]
-        numbers = [np.array([len(rows) for rows in part], float)[:, None] for part in (people, probes.rows)]
+        parts = people, probes.rows
+        sums = [np.array([y[rows].sum(axis=0) for rows in part]).reshape(len(part), size) for part in parts]
+        numbers = [np.array([len(rows) for rows in part], float)[:, None] for part in parts]
         person, probe = probes.person, probes.probe
         return cls(sums[0][person], numbers[0][person], sums[1][probe], numbers[1][probe], axes.spread)
 

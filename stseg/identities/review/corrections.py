@@ -69,7 +69,7 @@ def solve_corrections(tracks: Rows, answers: Sequence[Answer]) -> Corrections:
     cuts = {identity: {start} for identity, start in first.items()}
     for answer in answers:
         if answer.frame is not None and answer.action in ("swap", "split", "delete"):
-            for identity in {answer.track, answer.other} - {0}:
+            for identity in (answer.track, answer.other) if answer.action == "swap" else (answer.track,):
                 cuts[identity].add(max(answer.frame, first[identity]))
     pieces = [(identity, start) for identity in sorted(cuts) for start in sorted(cuts[identity])]
     following = {a: b for a, b in pairwise(pieces) if a[0] == b[0]}

@@ -7,16 +7,18 @@ import numpy as np
 from scipy.special import expit
 
 from stseg.arrays import Floats, Rows, by_track, columns, some_columns
+from stseg.records.border import Border
 from stseg.records.track_heights import median_measured
+from stseg.tracking.row_groups import EXCHANGE_DISTANCE
 
-_ENCOUNTER_DISTANCE = 0.7
-"""Distance of an encounter, metres."""
 _COMPARED_TIME = 2.0
 """Time before and after an encounter in which heights are compared, seconds."""
 _HEIGHT_ERROR = 0.05
 """Standard deviation of a track's median height, metres."""
-_VELOCITY_NOISE = 0.6
-"""Standard deviation of a change of velocity, metres a second for each second."""
+_SPEED_ERROR = 0.6
+"""Standard deviation of a velocity, metres a second."""
+_ACCELERATION = 1.0
+"""Standard deviation of the acceleration over a gap, metres a second squared."""
 _PLACE_ERROR = 0.3
 """Standard deviation of positions extrapolated over a moment, metres."""
 _LONGEST_GAP = 10.0
@@ -58,11 +60,8 @@ class Doubt:
         return float(expit(-self.margin))
 
 
-def find_doubts(trajectory: Rows, frame_rate: float, border: Floats) -> list[Doubt]:
-    """Doubtful decisions of a run, the most doubtful first.
-
-    `frame_rate` is in frames per second; `border` float64 (2, 2) the lower and upper corner of the area, metres.
-    """
+def find_doubts(trajectory: Rows, frame_rate: float, border: Border) -> list[Doubt]:
+    """Doubtful decisions of a run, the most doubtful first; `frame_rate` is in frames per second."""
     found = [*identity_doubts(trajectory, frame_rate), *_weak(_by_track(trajectory), frame_rate, border)]
     return sorted(found, key=lambda one: (one.margin, one.first, one.track))
 
@@ -83,7 +82,7 @@ def _by_track(trajectory: Rows) -> dict[int, Rows]:
 
 
 def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
-    """Times in which two tracks were near each other, and births beside a track that was there before."""
+    """Times in which two tracks were near each other."""
     found = []
     for a, b in _together(rows):
         common, in_a, in_b = np.intersect1d(rows[a]["frame"], rows[b]["frame"], return_indices=True)
@@ -91,7 +90,7 @@ def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
             continue
         offset: list[Floats] = [rows[a][axis][in_a] - rows[b][axis][in_b] for axis in ("x", "y")]
         distance = np.hypot(*offset)
-        encounter = common[distance < _ENCOUNTER_DISTANCE]
+        encounter = common[distance < EXCHANGE_DISTANCE]
         for part in np.split(encounter, np.flatnonzero(np.diff(encounter) > frame_rate) + 1):
             if len(part):
                 first, last = int(part[0]), int(part[-1])
@@ -118,8 +117,6 @@ def _swap_margin(a: Rows, b: Rows, first: int, last: int, frame_rate: float) -> 
     """Log-odds of the identities as they are against swapped ones: heights, and motion over short encounters."""
     length = round(_COMPARED_TIME * frame_rate)
     parts = [(_between(one, first - length, first), _between(one, last, last + length)) for one in (a, b)]
-    if any(not len(part) for pair in parts for part in pair):
-        return 0.0
     (a0, a1), (b0, b1) = parts
     height = _height(a0, b1) + _height(b0, a1) - _height(a0, a1) - _height(b0, b1)
     motion = _motion(a0, b1, frame_rate) + _motion(b0, a1, frame_rate)
@@ -140,7 +137,7 @@ def _motion(before: Rows, after: Rows, frame_rate: float) -> float:
     start = max(len(before) - 1 - round(frame_rate), 0)
     span = max(int(before["frame"][-1] - before["frame"][start]), 1) / frame_rate
     velocity = (here - np.array([before["x"][start], before["y"][start]])) / span
-    spread = _PLACE_ERROR + _VELOCITY_NOISE * gap + 0.5 * gap**2
+    spread = _PLACE_ERROR + _SPEED_ERROR * gap + _ACCELERATION * gap**2 / 2
     return 0.5 * float(((after_place - here - velocity * gap) ** 2).sum()) / spread**2
 
 
@@ -178,7 +175,7 @@ def _births(rows: dict[int, Rows], frame_rate: float, met: set[tuple[int, int, i
     return found
 
 
-def _weak(rows: dict[int, Rows], frame_rate: float, border: Floats) -> list[Doubt]:
+def _weak(rows: dict[int, Rows], frame_rate: float, border: Border) -> list[Doubt]:
     """Tracks that begin and end inside the area: the decision is that they are people."""
     found: list[Doubt] = []
     if not rows:
@@ -186,7 +183,7 @@ def _weak(rows: dict[int, Rows], frame_rate: float, border: Floats) -> list[Doub
     first, last = min(one["frame"][0] for one in rows.values()), max(one["frame"][-1] for one in rows.values())
     for identity, of_track in rows.items():
         ends = np.array([[of_track["x"][k], of_track["y"][k]] for k in (0, -1)])
-        inside = (np.minimum(ends - border[0], border[1] - ends) > _BORDER_WIDTH).all(axis=1)
+        inside = border.away(ends) > _BORDER_WIDTH
         if inside.all() and of_track["frame"][0] > first and of_track["frame"][-1] < last:
             margin = min(float(of_track["score"].mean()) * min(len(of_track) / frame_rate / 2.0, 3.0), _MARGIN_LIMIT)
             found.append(Doubt("false", identity, 0, int(of_track["frame"][0]), int(of_track["frame"][-1]), margin))

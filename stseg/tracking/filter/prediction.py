@@ -12,7 +12,7 @@ from stseg.config import MotionConfig, TrackingConfig
 from stseg.records.predicted_tracks import PredictedPlaces
 from stseg.tracking.windows.tracklets import Tracklet
 
-_DRIFT_SPEED = 0.5
+DRIFT_SPEED = 0.5
 """Growth of a place's standard deviation away from the nearest detection, metres per second."""
 _VELOCITY_STEPS = 4
 """Detections before the last from which the velocity is estimated."""
@@ -91,7 +91,7 @@ def predicted_places(
         places.ground[inside, k] = np.column_stack(
             [np.interp(frames[inside], detections.frame, g) for g in detections.ground.T]
         )
-        spread = (_DRIFT_SPEED * away / frame_rate) ** 2
+        spread = (DRIFT_SPEED * away / frame_rate) ** 2
         places.covariance[:, k] = detections.covariance[nearest] + spread[:, None, None] * np.eye(2)
         places.height[:, k] = detections.height[nearest]
     return places

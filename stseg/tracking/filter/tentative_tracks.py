@@ -8,7 +8,7 @@ from stseg.arrays import Boxes, Floats, ViewEvidence
 from stseg.geometry.distances import distances
 from stseg.records.people import People
 
-_LEAST_ODDS = -6.0
+_LEAST_LOG_ODDS = -6.0
 """Log-odds below which a rejected candidate starts no tentative track, nats."""
 _REPEATED_EVIDENCE = 2.0
 """Part of a rejected candidate's evidence that the next frame repeats, nats: in rigs with boxes, where a detector's
@@ -22,14 +22,14 @@ _SURE_RADIUS = 0.35
 """Radius within which no tentative track begins whose evidence adds up in full, metres: crowds nearly touch."""
 
 
-def tentative_odds(ghosts: People, standing: Floats, evidence: Sequence[ViewEvidence]) -> dict[int, float]:
+def tentative_log_odds(ghosts: People, standing: Floats, evidence: Sequence[ViewEvidence]) -> dict[int, float]:
     """Log-odds of the rejected candidates that become tentative tracks, by their index, nats.
 
     None begins near the places of other tracks, `standing` float64 (n, 2), metres. `evidence` is that of the views.
     """
     has_boxes = any(isinstance(view, Boxes) for view in evidence)
     is_repeated = has_boxes | ((ghosts.view_evidence != 0).sum(0) < SURE_VIEWS)
-    odds = ghosts.evidence - np.where(is_repeated, _REPEATED_EVIDENCE, 0.0)
+    log_odds = ghosts.evidence - np.where(is_repeated, _REPEATED_EVIDENCE, 0.0)
     distance = distances(ghosts.ground, standing).min(1, initial=np.inf)
     is_apart = distance >= np.where(is_repeated, EXCLUSION_RADIUS, _SURE_RADIUS)
-    return {j: float(odds[j]) for j in np.flatnonzero(is_apart & (odds > _LEAST_ODDS)).tolist()}
+    return {j: float(log_odds[j]) for j in np.flatnonzero(is_apart & (log_odds > _LEAST_LOG_ODDS)).tolist()}

@@ -18,7 +18,7 @@ from stseg.config import Config
 from stseg.records.people import People
 from stseg.records.predicted_tracks import EXISTENCE_DECAY, PredictedTracks
 from stseg.records.sizes import Sizes
-from stseg.tracking.filter.tentative_tracks import SURE_VIEWS, tentative_odds
+from stseg.tracking.filter.tentative_tracks import SURE_VIEWS, tentative_log_odds
 from stseg.tracking.filter.track_state import BodyPlace, Measurement, PlacePosterior, TrackState
 
 DETECTED_LOG_ODDS = 1.0
@@ -64,7 +64,7 @@ class TrackFilter:
                 np.array([t.width for t in predicted]),
                 np.array([t.width_variance for t in predicted]) + self.config.width_noise**2,
             ),
-            np.array([t.odds for t in predicted]),
+            np.array([t.log_odds for t in predicted]),
         )
 
     def update(self, frame: int, people: People, ghosts: People, evidence: Sequence[ViewEvidence] = ()) -> Ints:
@@ -84,24 +84,25 @@ class TrackFilter:
         for j, index in enumerate(people.track_index.tolist()):
             if index >= 0:
                 place = PlacePosterior(people.ground[j], people.covariance[j], self.body_place)
-                track, before = predicted[index].corrected(frame, place, heights[j], widths[j]), predicted[index].odds
+                track = predicted[index].corrected(frame, place, heights[j], widths[j])
+                before = predicted[index].log_odds
             else:
                 track, before = self._birth(frame, people, j).resized(heights[j], widths[j]), self.birth_log_odds
             if track.track == 0:
                 self.issued += 1
-            greatest = self._greatest_odds(track, frame, len(people.view_evidence))
-            odds = min(float(before + people.evidence[j] - people.prior[j]), greatest)
-            detected.append(track._replace(track=track.track or self.issued, odds=odds))
+            greatest = self._greatest_log_odds(track, frame, len(people.view_evidence))
+            log_odds = min(float(before + people.evidence[j] - people.prior[j]), greatest)
+            detected.append(track._replace(track=track.track or self.issued, log_odds=log_odds))
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = self._grounds([*detected, *(predicted[k] for k in missed)])
-        looked_for = tentative_odds(ghosts, standing, evidence).items()
-        tentative = [self._birth(frame, ghosts, j)._replace(odds=log_odds) for j, log_odds in looked_for]
+        looked_for = tentative_log_odds(ghosts, standing, evidence).items()
+        tentative = [self._birth(frame, ghosts, j)._replace(log_odds=log_odds) for j, log_odds in looked_for]
         self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
         return names
 
-    def _greatest_odds(self, track: TrackState, frame: int, views: int) -> float:
+    def _greatest_log_odds(self, track: TrackState, frame: int, views: int) -> float:
         """Greatest log-odds of a track that a frame of so many views detected, nats."""
         seconds = (frame - track.first_seen) / self.frame_rate if views >= SURE_VIEWS else 0.0
         return DETECTED_LOG_ODDS + _STANDING_LOG_ODDS * min(seconds / _STANDING_TIME, 1.0)
@@ -131,7 +132,7 @@ class TrackFilter:
     def _predicted(self, track: TrackState, frame: int) -> TrackState:
         seconds = (frame - track.last_seen) / self.frame_rate
         undetected = seconds - 1 / self.frame_rate
-        return track.predicted(seconds, self.motion)._replace(odds=track.odds - EXISTENCE_DECAY * undetected)
+        return track.predicted(seconds, self.motion)._replace(log_odds=track.log_odds - EXISTENCE_DECAY * undetected)
 
     def _birth(self, frame: int, people: People, j: int) -> TrackState:
         """The prior of a new track: near the place, sizes of the population, any velocity."""

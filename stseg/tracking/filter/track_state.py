@@ -72,7 +72,7 @@ class TrackState(NamedTuple):
     width: float
     width_variance: float
     """Body height and width, metres, and their variances, square metres."""
-    odds: float
+    log_odds: float
     """Log-odds of existence, nats."""
 
     def predicted(self, seconds: float, model: MotionConfig) -> TrackState:

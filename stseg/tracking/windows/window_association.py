@@ -100,7 +100,7 @@ class TrackAssociation:
     def _births_and_deaths(
         self, window: Window, tracklets: Sequence[Tracklet], names: Sequence[int]
     ) -> list[tuple[int, str, int, int, str]]:
-        """Update active tracks by the window's commit range, with birth, death and hand-over events."""
+        """Update active tracks by the window's commit range, with birth and death events."""
         events: list[tuple[int, str, int, int, str]] = []
         tracks = {track.identity: track for track in self.active}
         for tracklet, name in zip(tracklets, names, strict=True):
@@ -108,9 +108,6 @@ class TrackAssociation:
             if not kept.frames:
                 continue
             if name in tracks:
-                gap = kept.frames[0] - tracks[name].tail.frames[-1] - 1
-                if gap > 0:
-                    events.append((kept.frames[0], "hand-over", name, 0, f"found again after {gap} unseen frames"))
                 tracks[name].tail.extend(kept)
             else:
                 tracks[name] = ActiveTrack(name, kept)
