@@ -139,8 +139,6 @@ class Detector:
         observations, failures = self.observe(views, learned.box_noise.noise), learned.failures
         failures.begin(predicted, self.views, observations)
         included: ViewObservations = failures.kept(observations)
-        if predicted is not None and all(one is None for one in included):
-            return self._unseen(learned, included, predicted)
         is_key = frame % self._key_interval == 0
         if learned.rims.is_young and (is_key or predicted is None) and not self._has_boxes:
             self._learn_first_rims(learned, included, _FIRST_FRAME_SEARCHES if predicted is None else 1)
@@ -188,14 +186,6 @@ class Detector:
             estimate = better_of(estimate, self._search.repeated(estimate, people))
             return _with_best_alternative(estimate, untracked, people), True
         return explained_frame(estimate), True
-
-    def _unseen(self, learned: Estimates, observations: ViewObservations, predicted: PredictedTracks) -> Explanation:
-        """A frame that no view shows: nobody is detected by a prediction alone, and nothing is learned."""
-        learned.population.skip_frame()
-        learned.rims.skip_frame()
-        learned.frames += 1
-        evidence = self._evidence(observations, learned.population.body, predicted)
-        return explained_frame(MapEstimate.of_members(evidence, evidence.prior.pool().at(np.zeros(0, np.int64))))
 
     def _with_alternative(
         self, explanation: Explanation, other: Explanation, learned: Estimates, observations: ViewObservations

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Shorts
+from stseg.arrays import Flags, Floats, Ints, Shorts
 from stseg.bodies.outlines import paint_outlines
 from stseg.bodies.views import BoxView, PixelView, View
 from stseg.detection.ghosts import candidate_prior_log_odds, rejected_candidates
@@ -18,11 +18,21 @@ from stseg.view_health.reprojection_residuals import reprojection_residuals
 
 
 def explained_frame(estimate: MapEstimate) -> Explanation:
-    """The explanation by a final estimate: its members are refined, residuals measured."""
+    """The explanation by a final estimate: its members are refined, residuals measured.
+
+    Nobody is detected by a prediction alone, where no view says anything.
+    """
+    observed = is_observed(estimate)
+    estimate = estimate if observed.all() else estimate.with_members(estimate.members[observed])
     explanation = explained_by(estimate, refined_members(estimate))
     people, evidence = explanation.people, estimate.evidence
     residual = reprojection_residuals(people.candidates, evidence.views, evidence.observations, estimate.box_assignment)
     return replace(explanation, residual=residual)
+
+
+def is_observed(estimate: MapEstimate) -> Flags:
+    """Members of whom some view says something, bool (n,)."""
+    return np.asarray(estimate.members_score.view_evidence.any(0))
 
 
 def explained_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:

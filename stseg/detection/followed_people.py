@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.detection.explanation import explained_by
+from stseg.detection.explanation import explained_by, is_observed
 from stseg.detection.search.frame_search import FrameSearch
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.open_ground import OpenGround
@@ -106,7 +106,7 @@ def _members_of(followed: FollowedPeople, estimate: MapEstimate) -> tuple[Ints, 
 
 def _explained(estimate: MapEstimate, member: Ints, followed: RefinedPeople) -> Explanation:
     """The explanation by members (n,) who were followed and by the others, refined."""
-    others = np.delete(np.arange(len(estimate.members)), member)
+    others = np.setdiff1d(np.flatnonzero(is_observed(estimate)), member)
     ordered = estimate.with_members(estimate.members[np.concatenate([member, others])])
     found = refined_members(ordered, np.arange(len(member), len(ordered.members)))
     return explained_by(ordered, followed.joined_with(found))

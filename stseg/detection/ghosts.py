@@ -16,14 +16,14 @@ from stseg.records.sizes import Sizes
 
 
 def rejected_candidates(estimate: MapEstimate) -> People:
-    """The candidates outside an estimate's set, with the change of its score by each as evidence."""
+    """Candidates outside an estimate's set that some view shows, with the change of its score by each as evidence."""
     config, body = estimate.evidence.prior.config, estimate.evidence.prior.body
     rejected, additions = estimate.others, estimate.other_additions
     pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
     covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))
     prior = candidate_prior_log_odds(estimate, rejected, additions.track_index)
     sizes = Sizes.of_population(len(rejected), body)
-    return People(
+    candidates = People(
         pool.ground,
         pool.height,
         pool.width,
@@ -35,6 +35,7 @@ def rejected_candidates(estimate: MapEstimate) -> People:
         births,
         sizes,
     )
+    return candidates.at(np.flatnonzero(additions.view_evidence.any(0)))
 
 
 def candidate_prior_log_odds(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:
