@@ -19,7 +19,7 @@ from stseg.bodies.pillars import BodyTable
 from stseg.config import OccupancyConfig
 from stseg.geometry import Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
-from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, sum_of
 from stseg.occupancy.box_planes import CellFit, Vicinity, fill_fit, fill_levels, level_of_match, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
@@ -167,6 +167,19 @@ def test_a_box_says_as_much_as_its_match_is_worth(near_person: int, clutter: flo
     np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
     erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))
     np.testing.assert_allclose(erring, match, atol=0.2 * clutter)
+
+
+def test_terms_and_sums_at_the_end_of_their_numbers() -> None:
+    terms = log_odds_terms(ErrorRates(0.2, 0.07, 0.4))
+    np.testing.assert_allclose(terms[:, 0], np.log([0.2 / 0.93, 0.2 / 0.6]), rtol=1e-5)
+    np.testing.assert_allclose(terms[:, TOP_LEVEL], np.log([0.8 / 0.07, 0.8 / 0.4]), rtol=1e-5)
+    assert (np.diff(terms) > 0).all()
+    levels = np.random.default_rng(0).integers(0, TOP_LEVEL + 1, (8, 9))
+    whole = np.pad(levels.cumsum(0).cumsum(1), ((1, 0), (1, 0))) + 2**32 - 40_000
+    sums = (whole % 2**32).astype(np.uint32)
+    assert (np.diff(sums.astype(float), axis=1) < 0).any()
+    with np.errstate(over="ignore"):
+        assert sum_of(sums, 2, 1, 9, 7) == levels[1:7, 2:9].sum()
 
 
 LEVEL = 0.01
