@@ -6,7 +6,6 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from difflib import get_close_matches
-from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
 from typing import Literal, NoReturn
@@ -151,19 +150,6 @@ def _drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def application() -> App:
-    """The application with all commands imported, as shell completion needs it."""
-    app = App(name="stseg", version=__version__)
-    for name, (path, summary) in COMMANDS.items():
-        module, _, attribute = path.partition(":")
-        found = getattr(import_module(module), attribute)
-        if isinstance(found, App):
-            app.command(found)
-        else:
-            app.command(found, name=name, help=summary)
-    return app
-
-
 def _app(tokens: Sequence[str]) -> App:
     """The application with the requested command imported; the others are a line in the list."""
     app = App(
@@ -207,4 +193,4 @@ def completion(shell: Literal["bash", "zsh", "fish"], /) -> None:
     shell
         bash, zsh or fish.
     """
-    print(application().generate_completion(shell=shell))
+    print(_app([]).generate_completion(shell=shell))
