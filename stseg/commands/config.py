@@ -5,13 +5,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Settings
 from stseg.io.config_file import describe_config, read_config
 
 
 def config(
     *,
     config: Path | None = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
+    set_: Settings = (),
     expert: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Print the configuration, with the meaning and unit of every key, as a TOML file.

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Overwrite
 from stseg.tasks import correction
 
 
@@ -14,7 +15,7 @@ def correct(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="CORRECTED.h5")],
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write a run file with corrected identities; the run itself stays as it is.
 
@@ -40,8 +41,6 @@ def correct(
         The answers.
     output
         The run file to write.
-    overwrite
-        Replace the file if it exists.
     """
     found = correction.correct(run_file, answers, output, overwrite=overwrite)
     changed = sum(answer.action != "keep" for answer in found.answers)

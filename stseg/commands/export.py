@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Overwrite
 from stseg.commands.terminal.standard_error import warn
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
@@ -23,7 +24,7 @@ def export(
     to: Annotated[str, Parameter(metavar="FORMAT")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="FILE")],
     names: Annotated[Path | None, Parameter(metavar="NAMES.csv")] = None,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write the tracks of a run file in another format.
 
@@ -47,8 +48,6 @@ def export(
         The file to write.
     names
         CSV with the columns id,name: csv, parquet, geojson and mf-json hold the names of tracks too.
-    overwrite
-        Replace the file if it exists.
     """
     if to not in (*FORMATS, *ARCHIVES):
         raise ConfigError("command line", "--to", repr(to), f"one of {', '.join((*FORMATS, *ARCHIVES))}")

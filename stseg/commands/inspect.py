@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
+from stseg.commands.options import Overwrite
 from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
@@ -29,7 +30,7 @@ def inspect(
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
     slice_: Annotated[str | None, Parameter(name="--slice", metavar="t=SECONDS,plane=METRES")] = None,
     output: Annotated[Path | None, Parameter(name=["-o", "--output"], metavar="SLICE.png")] = None,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Summarise a run file: extent, people, tracks, events, ghosts, timings and warnings; or the sources of a rig file.
 
@@ -53,8 +54,6 @@ def inspect(
         frame=NUMBER), plane in metres above the ground (or plane=all, the greatest of them); the nearest are taken.
     output
         The picture of the slice, PNG; of a rig file, a folder for the pictures.
-    overwrite
-        Replace the picture if it exists.
     """
     if run.suffix.lower() == ".toml":
         if slice_ is not None or as_json:

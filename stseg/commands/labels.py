@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Frames, Settings
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.tasks.pixel_labels import label_images
@@ -15,8 +16,8 @@ def labels(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="FOLDER")],
-    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
+    frames: Frames = None,
+    set_: Settings = (),
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Write for every pixel of every camera which track it shows.

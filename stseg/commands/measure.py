@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Overwrite
 from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.measures.measure import Measures
 from stseg.tasks import measures
@@ -18,7 +19,7 @@ def measure(
     zones: Annotated[Path | None, Parameter(metavar="ZONES.geojson")] = None,
     lines: Annotated[Path | None, Parameter(metavar="LINES.geojson")] = None,
     format_: Annotated[Literal["csv", "parquet"], Parameter(name="--format")] = "csv",
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Measure a run: people in zones, crossings of lines, speeds, distances, density and flow.
 
@@ -44,8 +45,6 @@ def measure(
         GeoJSON with lines (LineString), likewise.
     format_
         csv, or parquet (needs pyarrow).
-    overwrite
-        Replace tables that exist.
     """
     found = measures.measure(run_file, zones, lines, output=output, format_=format_, overwrite=overwrite)
     _print(found)

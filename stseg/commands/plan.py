@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Frames, Settings
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.config_file import read_config
@@ -21,9 +22,9 @@ def plan(
     rig: Path,
     /,
     *,
-    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    frames: Frames = None,
     config: Path | None = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
+    set_: Settings = (),
     tracker: str = "cut",
     volume: VolumeKind = "all",
     workers: int | None = None,

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Frames, Overwrite
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.answers import read_names
@@ -22,10 +23,10 @@ def report(
     frame: Annotated[tuple[int, ...], Parameter(negative="")] = (),
     pictures: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
     video: Annotated[Path | None, Parameter(metavar="FILM.webm")] = None,
-    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    frames: Frames = None,
     camera_images: Annotated[bool, Parameter(negative="")] = False,
     names: Annotated[Path | None, Parameter(metavar="NAMES.csv")] = None,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Make an HTML page of a run that needs no other file and loads nothing, or a film of it.
 
@@ -62,8 +63,6 @@ def report(
         Show the cameras' frames under the tracks. Page, pictures and film then hold images of people.
     names
         CSV with the columns id,name: names of tracks in the page and its pictures.
-    overwrite
-        Replace the page, the pictures and the film if they exist.
     """
     run = read_run(run_file)
     inputs = Inputs(run.files, [truth, names])

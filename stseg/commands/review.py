@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Overwrite
 from stseg.errors import ConfigError
 from stseg.tasks.review import write_review
 
@@ -16,7 +17,7 @@ def review(
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="REVIEW.html")],
     most: int = 50,
     camera_images: Annotated[bool, Parameter(negative="")] = False,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Make a page that asks about the decisions of which a run is least sure, in the order of doubt.
 
@@ -36,8 +37,6 @@ def review(
         Number of questions at most; decisions that are more than 99 % certain are not asked about.
     camera_images
         Show the cameras' frames under the tracks. The page then holds images of people.
-    overwrite
-        Replace the page if it exists.
     """
     if most < 1:
         raise ConfigError("--most", "", most, "1 or more questions")

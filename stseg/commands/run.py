@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Frames, Settings
 from stseg.engine.workers.worker_processes import prepare_workers
 from stseg.errors import ConfigError
 from stseg.io.runfile.layout import SUFFIXES, VolumeKind
@@ -20,9 +21,9 @@ def run(
     /,
     *,
     output: Annotated[Path, Parameter(name=["-o", "--output"])],
-    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    frames: Frames = None,
     config: Path | None = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
+    set_: Settings = (),
     tracker: str = "cut",
     volume: VolumeKind = "all",
     labels: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Overwrite
 from stseg.commands.terminal.standard_error import warn
 from stseg.tasks.calibration.alignment import align_rig
 
@@ -20,7 +21,7 @@ def align(
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
     align: Literal["rigid", "similarity"] = "similarity",
     metres_per_pixel: float | None = None,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Turn, shift and scale a rig onto a ground that you know, such as that of a building.
 
@@ -44,8 +45,6 @@ def align(
     metres_per_pixel
         Where x and y are pixels of a floor plan's picture, y counted downwards: its scale. The origin becomes the
         picture's upper left corner, and y is counted upwards.
-    overwrite
-        Replace the rig file if it exists.
     """
     found = align_rig(rig, reference, output, align=align, metres_per_pixel=metres_per_pixel, overwrite=overwrite)
     for point in found.points:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from stseg.commands.calibrate.scene import numbers
+from stseg.commands.options import Frames, Overwrite
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.geometry import Grid
@@ -21,11 +22,11 @@ def calibrate_auto(
     person_height: float = 1.7,
     distance: Annotated[tuple[str, ...], Parameter(metavar="CAMERA,U,V,U,V,METRES", negative="")] = (),
     most_delay: float = 2.0,
-    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    frames: Frames = None,
     background: Annotated[str | None, Parameter(metavar="PATTERN")] = None,
     source_kind: Literal["video", "masks"] = "video",
     cell: float = Grid.cell,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Make a rig file from the videos alone: from people who walk where several cameras see them.
 
@@ -59,8 +60,6 @@ def calibrate_auto(
         Colour videos, or videos of masks.
     cell
         Side of a ground cell of the rig, metres.
-    overwrite
-        Replace the rig file if it exists.
     """
     distances = [_distance(text, camera_names(videos)) for text in distance]
     found = automatic.calibrate_auto(

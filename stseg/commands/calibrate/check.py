@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.commands.options import Frames, Overwrite
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.engine.offline.frame_range import FrameRange
@@ -21,9 +22,9 @@ def check(
     *,
     output: Annotated[Path | None, Parameter(name=["-o", "--output"], metavar="CHECK.html")] = None,
     pictures: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
-    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    frames: Frames = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Check each view of a rig against the others, by the people in the recording.
 
@@ -49,8 +50,6 @@ def check(
         Part of the recording to look at, half open; without it, its first 300 frames.
     as_json
         Print the verdict as JSON.
-    overwrite
-        Replace the page and the pictures if they exist.
     """
     if output is not None:
         require_output(output, overwrite, Inputs(recording_files(read_recording(rig))))

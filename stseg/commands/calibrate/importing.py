@@ -8,6 +8,7 @@ from typing import Annotated, Literal, get_args
 from cyclopts import Parameter
 
 from stseg.commands.calibrate.scene import SceneOptions, StreamOptions, size_of, words
+from stseg.commands.options import Overwrite
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.geometry.rig import is_mirrored
@@ -34,7 +35,7 @@ def import_calibration(
     mirrored: Annotated[bool, Parameter(negative="")] = False,
     head: float = 1.75,
     names: Annotated[str | None, Parameter(metavar="A,B,...")] = None,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Make a rig file from the calibrations of other programs.
 
@@ -71,8 +72,6 @@ def import_calibration(
     names
         Names of the cameras; without them, those in the calibrations, of the files, or of their folders where all
         files are called the same.
-    overwrite
-        Replace the rig file if it exists.
     """
     require_output(output, overwrite, Inputs(Path(part) for file in files for part in file.split("+")))
     shared = None if size is None else size_of(size)

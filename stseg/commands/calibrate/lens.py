@@ -7,6 +7,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.calibration.points.checkerboard import find_corners, fit_lens
+from stseg.commands.options import Overwrite
 from stseg.errors import ConfigError
 from stseg.io.calibrations.xml_files import write_opencv_lens
 from stseg.io.outputs.whole_files import Inputs, require_output
@@ -28,7 +29,7 @@ def calibrate_lens(
     board: Annotated[str, Parameter(metavar="COLUMNS,ROWS")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="LENS.xml")],
     every: int = 5,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Find a camera's matrix and lens from a video of a checkerboard that is moved before it.
 
@@ -47,8 +48,6 @@ def calibrate_lens(
         OpenCV XML with camera_matrix and distortion_coefficients.
     every
         Frames from one that is looked at to the next.
-    overwrite
-        Replace the file if it exists.
     """
     require_output(output, overwrite, Inputs([video]))
     sides = parse_pair(board, 3, _MOST_CORNERS)

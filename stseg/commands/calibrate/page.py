@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from stseg.arrays import Bytes
 from stseg.commands.calibrate.scene import area_of
+from stseg.commands.options import Overwrite
 from stseg.errors import ConfigError, SourceError
 from stseg.io.outputs.whole_files import Inputs, require_output, write_page
 from stseg.io.recording.pictures import read_colour
@@ -30,7 +31,7 @@ def calibrate_page(
     area: Annotated[str, Parameter(metavar="X0,Y0,X1,Y1", allow_leading_hyphen=True)] = "-5,-5,5,5",
     frame: Annotated[tuple[int, ...], Parameter(negative="")] = (),
     plan: Annotated[Path | None, Parameter(metavar="PLAN.png")] = None,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Make a page on which you click ground points: the cameras' homographies are solved as you click.
 
@@ -52,8 +53,6 @@ def calibrate_page(
         frames 0, 50, 100, 200, 400 and 800 of videos that are so long.
     plan
         Picture of the ground from above that spans the area exactly, y up.
-    overwrite
-        Replace the page if it exists.
     """
     require_output(output, overwrite, Inputs(videos, [plan]))
     names = camera_names(videos)

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from stseg.calibration.points.point_fit import PointFit
 from stseg.commands.calibrate.scene import SceneOptions, StreamOptions, size_of
+from stseg.commands.options import Overwrite
 from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.tasks.calibration import points as points_task
 from stseg.tasks.calibration.points import PointCalibration
@@ -30,7 +31,7 @@ def calibrate_points(
     streams: StreamOptions | None = None,
     unit: Literal["mm", "cm", "m"] = "m",
     lens: Annotated[str | None, Parameter(metavar="PATTERN")] = None,
-    overwrite: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Make a rig file from measured ground points and their pixels in each camera.
 
@@ -58,8 +59,6 @@ def calibrate_points(
     lens
         OpenCV XML with `camera_matrix` and `distortion_coefficients` of each camera, `{name}` standing for its name.
         Without it, a radial lens is fitted where eight points or more bear it out.
-    overwrite
-        Replace the rig file if it exists.
     """
     found = points_task.calibrate_points(
         points,
