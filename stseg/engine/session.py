@@ -191,18 +191,10 @@ def run_session(
     cores: Callable[[], int] = two_cores,
     factors: Sequence[int] | None = None,
 ) -> Iterator[CommittedFrames]:
-    """The results of frame sets in a session of their own, each as soon as it is decided.
+    """The results of frame sets, in the order of time, in a `Session` of their own, each as soon as it is decided.
 
-    Parameters
-    ----------
-    pipeline, foregrounds, first, factors
-        As of `Session`.
-    frame_sets
-        In the order of time.
-    advance
-        Called with the number of each frame that went through detection.
-    cores
-        Processor cores for this session from the next frame on; with one it has no threads but those that decode.
+    `advance` receives the number of each frame that went through detection. `cores` says how many processor cores the
+    session has from the next frame on; with one it has no threads but those that decode.
     """
     with ExitStack() as threads:
         session = Session(pipeline, foregrounds, first, factors)

@@ -120,24 +120,7 @@ def track_recording(
     *,
     overwrite: bool = False,
 ) -> Run:
-    """Track a recording; segments that an unfinished run of the same output left are used.
-
-    Parameters
-    ----------
-    recording, config, tracker, volume
-        The input, see `stseg.engine.offline.job.Job`.
-    output
-        The run file.
-    frames
-        Part of the recording; None for all of it.
-    workforce
-        The processes that make segments.
-    reporter
-        Receives notes and progress.
-    known
-        The run file of an earlier recording, whose people are recognised.
-    overwrite
-        Whether an older file of that name may be replaced.
+    """As `track`, with what it has read: a recording, its configuration and frames, and the processes that are used.
 
     Raises
     ------

@@ -67,20 +67,8 @@ def follow_recording(
 ) -> Followed | None:
     """Track a recording in progress until a stop is requested, then write its run file.
 
-    Parameters
-    ----------
-    recording, config, tracker, volume
-        The input, see `stseg.engine.offline.job.Job`.
-    output
-        Path of the run file; tracks are appended to `live_table_of(output)` during the run.
-    frames
-        0:B to stop before frame B; None to run until a signal.
-    reporter
-        Receives notes and progress.
-    publish
-        Receives the rows of the live table as JSON lines, too.
-    overwrite
-        Whether existing files of those names may be replaced.
+    As `track_recording`, but frames 0:B stop it before frame B, and None until a signal. `publish` receives the rows of
+    `live_table_of(output)`, to which tracks are appended meanwhile, as JSON lines.
 
     Returns
     -------

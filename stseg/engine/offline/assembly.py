@@ -107,18 +107,8 @@ class _Association(NamedTuple):
 def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: Caller = called_here) -> None:
     """Write the run file of a job from its finished segments.
 
-    What takes no track ids is copied while the tracks are associated. Rows are read and written part by part.
-
-    Parameters
-    ----------
-    job
-        The run.
-    finished
-        All segments of the run, in their order.
-    output
-        Path of the run file; an existing file is replaced.
-    call
-        How the tracks are associated, see `stseg.engine.offline.calls`.
+    What takes no track ids is copied while the tracks are associated, by `call`. Rows are read and written part by
+    part, from all segments in their order. An existing output is replaced.
     """
     return_freed_memory()  # of tracking
     views = read_run(finished[0].path).views

@@ -23,18 +23,8 @@ Pass = Callable[[int, KeptFile, Callable[[int], None]], None]
 def with_boxes(recording: Recording, folder: Path, reporter: Reporter, overwrite: bool = False) -> Recording:
     """The recording with boxes in place of each source that names a detector, and its frames as images beside them.
 
-    Boxes and features that are in the folder already are used; the frames are searched for the others.
-
-    Parameters
-    ----------
-    recording
-        The rig and its streams.
-    folder
-        Folder of the boxes and features, a file of each for a camera.
-    reporter
-        Receives progress.
-    overwrite
-        Whether those of another model or video may be replaced.
+    Boxes and features that are in the folder already are used, those of another model or video only replaced by
+    `overwrite`; the frames are searched for the others. The folder has a file of each for a camera.
 
     Raises
     ------

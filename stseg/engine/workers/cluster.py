@@ -20,23 +20,9 @@ from stseg.errors import ConfigError, WorkerError
 def make_by_cluster(
     job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], address: str, advance: Advance
 ) -> Iterator[tuple[Segment, Path]]:
-    """Process segments by the workers of a scheduler, in the order in which they finish.
+    """`Workforce.make` by the workers of the scheduler at an address, such as tcp://10.0.0.5:8786.
 
-    Parameters
-    ----------
-    job, missing
-        The run, and its segments that are not finished.
-    draft
-        Path of a segment's unfinished file, by segment index; in a folder shared by all workers.
-    address
-        Address of the scheduler, such as tcp://10.0.0.5:8786.
-    advance
-        Called with the number of frames fused since the last call.
-
-    Yields
-    ------
-    tuple of Segment and Path
-        A finished segment and its file.
+    The folder of the drafts is shared by all of them.
 
     Raises
     ------

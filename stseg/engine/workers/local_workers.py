@@ -46,25 +46,7 @@ class _Worker:
 def make_by_workers(
     job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], workers: int, advance: Advance, note: Note
 ) -> Iterator[tuple[Segment, Path]]:
-    """Process segments by worker processes, in the order in which they finish.
-
-    Parameters
-    ----------
-    job, missing
-        The run, and its segments that are not finished.
-    draft
-        Path of a segment's unfinished file, by segment index.
-    workers
-        Number of processes.
-    advance
-        Called with the number of further frames that were fused.
-    note
-        Called with messages about the work, each once.
-
-    Yields
-    ------
-    tuple of Segment and Path
-        A finished segment and its file.
+    """`Workforce.make` by that many worker processes.
 
     Raises
     ------
