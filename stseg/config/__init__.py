@@ -2,48 +2,26 @@
 
 from dataclasses import dataclass, field, fields
 
-from stseg.config.detection import DetectionConfig, ErrorRateConfig, LabelConfig, OccupancyConfig, ProposalConfig
-from stseg.config.foreground import (
-    BackgroundConfig,
-    ChromaticConfig,
-    CodebookConfig,
-    ForegroundConfig,
-    IlluminationConfig,
-    MixtureConfig,
-)
-from stseg.config.trackers import BeliefConfig, KalmanConfig, ParticleConfig
-from stseg.config.tracking import (
-    BodyConfig,
-    LiveConfig,
-    MotionConfig,
-    SegmentationConfig,
-    SegmentConfig,
-    TrackingConfig,
-)
-
-__all__ = [
-    "BackgroundConfig",
-    "BeliefConfig",
-    "BodyConfig",
-    "ChromaticConfig",
-    "CodebookConfig",
-    "Config",
-    "DetectionConfig",
-    "ErrorRateConfig",
-    "ForegroundConfig",
-    "IlluminationConfig",
-    "KalmanConfig",
-    "LabelConfig",
-    "LiveConfig",
-    "MixtureConfig",
-    "MotionConfig",
-    "OccupancyConfig",
-    "ParticleConfig",
-    "ProposalConfig",
-    "SegmentConfig",
-    "SegmentationConfig",
-    "TrackingConfig",
-]
+from stseg.config.detection import DetectionConfig as DetectionConfig
+from stseg.config.detection import ErrorRateConfig as ErrorRateConfig
+from stseg.config.detection import LabelConfig as LabelConfig
+from stseg.config.detection import OccupancyConfig as OccupancyConfig
+from stseg.config.detection import ProposalConfig as ProposalConfig
+from stseg.config.foreground import BackgroundConfig as BackgroundConfig
+from stseg.config.foreground import ChromaticConfig as ChromaticConfig
+from stseg.config.foreground import CodebookConfig as CodebookConfig
+from stseg.config.foreground import ForegroundConfig as ForegroundConfig
+from stseg.config.foreground import IlluminationConfig as IlluminationConfig
+from stseg.config.foreground import MixtureConfig as MixtureConfig
+from stseg.config.trackers import BeliefConfig as BeliefConfig
+from stseg.config.trackers import KalmanConfig as KalmanConfig
+from stseg.config.trackers import ParticleConfig as ParticleConfig
+from stseg.config.tracking import BodyConfig as BodyConfig
+from stseg.config.tracking import LiveConfig as LiveConfig
+from stseg.config.tracking import MotionConfig as MotionConfig
+from stseg.config.tracking import SegmentationConfig as SegmentationConfig
+from stseg.config.tracking import SegmentConfig as SegmentConfig
+from stseg.config.tracking import TrackingConfig as TrackingConfig
 
 
 @dataclass(frozen=True)

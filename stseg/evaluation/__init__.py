@@ -4,6 +4,5 @@
 matches come CLEAR and IDF1 (`clear`), and HOTA (`hota`). `scores` collects them.
 """
 
-from stseg.evaluation.scores import Scores, evaluate
-
-__all__ = ["Scores", "evaluate"]
+from stseg.evaluation.scores import Scores as Scores
+from stseg.evaluation.scores import evaluate as evaluate

@@ -3,29 +3,16 @@
 from collections.abc import Callable
 from typing import Any
 
-from stseg.bodies.box_likelihood import box_likelihood
-from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
-from stseg.foreground.background.codebook import Codebook
-from stseg.foreground.background.mixture import Chromatic, Mixture
-from stseg.foreground.background.model import Background
-from stseg.foreground.illumination import IlluminationMonitor, LightChange
-from stseg.foreground.view_foreground import instance_boxes, mask_likelihood
-
-__all__ = [
-    "Background",
-    "Chromatic",
-    "ChromaticConfig",
-    "Codebook",
-    "CodebookConfig",
-    "IlluminationMonitor",
-    "LightChange",
-    "Mixture",
-    "MixtureConfig",
-    "box_likelihood",
-    "instance_boxes",
-    "make_background",
-    "mask_likelihood",
-]
+from stseg.bodies.box_likelihood import box_likelihood as box_likelihood
+from stseg.config import ForegroundConfig
+from stseg.foreground.background.codebook import Codebook as Codebook
+from stseg.foreground.background.mixture import Chromatic as Chromatic
+from stseg.foreground.background.mixture import Mixture as Mixture
+from stseg.foreground.background.model import Background as Background
+from stseg.foreground.illumination import IlluminationMonitor as IlluminationMonitor
+from stseg.foreground.illumination import LightChange as LightChange
+from stseg.foreground.view_foreground import instance_boxes as instance_boxes
+from stseg.foreground.view_foreground import mask_likelihood as mask_likelihood
 
 MODELS: dict[str, Callable[[tuple[int, int], float, Any], Background]] = {
     "mixture": Mixture,

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from reference_foreground import FLOOR, SHIRT, near_modes, noisy, random_modes
 
 from stseg.arrays import Boxes, Bytes, Floats
-from stseg.config import ChromaticConfig
+from stseg.config import ChromaticConfig, MixtureConfig
 from stseg.errors import InputError, SourceError
-from stseg.foreground import Mixture, MixtureConfig, box_likelihood, instance_boxes, mask_likelihood
+from stseg.foreground import Mixture, box_likelihood, instance_boxes, mask_likelihood
 from stseg.foreground.background.gaussian_kernels import (
     Adaptation,
     adapt_mixture,
