@@ -7,9 +7,7 @@ from cyclopts import Parameter
 
 from stseg.commands.options import Frames, Overwrite
 from stseg.commands.terminal.standard_error import TerminalReporter
-from stseg.engine.offline.frame_range import FrameRange
-from stseg.io.answers import read_names
-from stseg.io.outputs.whole_files import Inputs
+from stseg.engine.offline.frame_range import FrameRange, frames_of_run
 from stseg.io.runfile.runs import read_run
 from stseg.tasks import report as reports
 
@@ -64,16 +62,10 @@ def report(
     names
         CSV with the columns id,name: names of tracks in the page and its pictures.
     """
-    run = read_run(run_file)
-    inputs = Inputs(run.files, [truth, names])
-    reports.require_outputs(output, pictures, video, frames, overwrite, inputs)
-    if names is not None:
-        run = run.with_names(read_names(names))
-    if output is not None:
-        written = reports.write_report(run, output, truth, frame, pictures, camera_images, overwrite, inputs)
-        for path in written:
-            print(f"wrote {path}")
-    if video is not None:
-        chosen = FrameRange.parsed(frames)
-        count = reports.film(run, video, chosen, camera_images, TerminalReporter(), overwrite)
-        print(f"wrote {video}: {count} frames")
+    run, chosen = read_run(run_file), FrameRange.parsed(frames)
+    written = reports.report(
+        run, output, truth=truth, frame=frame, pictures=pictures, video=video, frames=chosen,
+        camera_images=camera_images, names=names, overwrite=overwrite, progress=TerminalReporter(),
+    )  # fmt: skip
+    for path in written:
+        print(f"wrote {path}" if path != video else f"wrote {path}: {len(frames_of_run(run, chosen))} frames")

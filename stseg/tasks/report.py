@@ -1,6 +1,7 @@
 """`stseg.report`: a run as one HTML page, as pictures and as a film."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
 from pathlib import Path
@@ -8,14 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Bytes, Ints, Observation
-from stseg.engine.offline.frame_range import FrameSpan, frames_of_run
+from stseg.engine.offline.frame_range import FrameRange, FrameSpan, frames_of_run
 from stseg.engine.recordings import run_of
 from stseg.engine.reporter import AnyReporter, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
 from stseg.io.outputs.video_writer import require_film_name, write_film
 from stseg.io.outputs.whole_files import Inputs, make_folder, require_output, write_page, write_png
-from stseg.io.recording.frames import open_frames
+from stseg.io.recording.aligned_stream import decoder_threads
+from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
 from stseg.io.track_csv import read_tracks_csv
@@ -84,18 +86,26 @@ def report(
     )
     found = run_of(run)
     inputs = Inputs(found.files, [true, named])
-    require_outputs(page, folder, movie, None if frames is None else "{}:{}".format(*frames), overwrite, inputs)
+    _require_outputs(page, folder, movie, None if frames is None else FrameRange(*frames), overwrite, inputs)
+    film_frames = np.zeros(0, np.int64) if movie is None else frames_of_run(found, frames)
     if named is not None:
         found = found.with_names(read_names(named))
-    paths = [] if page is None else write_report(found, page, true, frame, folder, camera_images, overwrite, inputs)
+    paths = [] if page is None else _write_page(found, page, true, frame, folder, camera_images, overwrite, inputs)
     if movie is not None:
-        film(found, movie, frames, camera_images, reporter_of(progress), overwrite)
+        film = RunFilm(found.recording.rig, found.views, found.trajectory)
+        drawn = _film_pictures(found, film, film_frames, camera_images, reporter_of(progress))
+        write_film(movie, drawn, found.frame_rate, overwrite)
         paths.append(movie)
     return paths
 
 
-def require_outputs(
-    output: Path | None, pictures: Path | None, video: Path | None, frames: str | None, overwrite: bool, inputs: Inputs
+def _require_outputs(
+    output: Path | None,
+    pictures: Path | None,
+    video: Path | None,
+    frames: FrameRange | None,
+    overwrite: bool,
+    inputs: Inputs,
 ) -> None:
     """Refuse outputs that cannot be written and options without effect, before any work."""
     if output is None and pictures is not None:
@@ -111,7 +121,7 @@ def require_outputs(
         require_film_name(video)
 
 
-def write_report(
+def _write_page(
     run: Run,
     output: Path,
     truth: Path | None,
@@ -138,13 +148,6 @@ def write_report(
     return [output, *write_figures(pictures, still, overwrite, inputs)]
 
 
-def film(run: Run, output: Path, frames: FrameSpan, camera_images: bool, reporter: Reporter, overwrite: bool) -> int:
-    """Write the film, see `report`; the number of its frames."""
-    numbers = frames_of_run(run, frames)
-    drawn = RunFilm(run.recording.rig, run.views, run.trajectory)
-    return write_film(output, _film_pictures(run, drawn, numbers, camera_images, reporter), run.frame_rate, overwrite)
-
-
 def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
     """The frames to show, in order of time."""
     numbers = run.frames.tolist()
@@ -159,9 +162,11 @@ def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
 
 
 def read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[Observation, ...]]:
-    """Observations of these frames, which are in order, by frame."""
-    with open_frames(recording.pictured(), frames[0], frames[-1] + 1) as frame_sets:
-        return {frame_set.frame: frame_set.views for frame_set in frame_sets if frame_set.frame in frames}
+    """Observations of these frames, which are in order, by frame; those between are skipped."""
+    pictured = recording.pictured()
+    with ThreadPoolExecutor(decoder_threads(pictured)) as pool:
+        views = pool.map(lambda k: list(read_camera(pictured, k, frames)), range(len(pictured.sources)))
+    return dict(zip(frames, zip(*views, strict=True), strict=True))
 
 
 def _named(run: Run, instants: Sequence[Instant]) -> list[Figure]:
