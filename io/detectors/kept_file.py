@@ -17,7 +17,7 @@ from typing import Self
 
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import MARK, output_errors, sync_folder, write_file
-from stseg.io.runfile.unfinished.part_file import lock
+from stseg.io.runfile.unfinished.part_file import locked_file
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import is_regular, parse_json, read_text
 from stseg.io.untrusted.values import abbreviated
@@ -92,9 +92,7 @@ class KeptFile:
     def begin(self, header: bytes, by_stamps: bool) -> Self:
         """Make the file as long as the state says, and hold it; a new one begins with the header."""
         with output_errors(self.path):
-            flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
-            self._file = os.fdopen(os.open(self._unfinished, flags, 0o666), "r+b")
-            lock(self._file)
+            self._file = locked_file(self._unfinished)
             if not self.state.frames:
                 self._file.truncate(0)
                 self._file.write(header)

@@ -12,15 +12,17 @@ from typing import Any
 import detector_models
 import numpy as np
 import pytest
-from checks import Command, cases, compiled_only
+from checks import Command, cases, compiled_only, refused
 from films import regular, write_at_rate, write_stamped
 from recordings import assert_same, track
 from scenes import SIZE, body_box, corner_cameras, mask, rig_of
 
 from stseg import Boxes, Recording, Source, detect, read_recording, read_run
 from stseg.arrays import Bytes
+from stseg.errors import OutputError
 from stseg.io.detectors import detected_boxes
 from stseg.io.detectors.feature_model import FeatureModel
+from stseg.io.detectors.kept_file import KeptFile
 from stseg.io.detectors.people_detector import OnnxDetector
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.frames import open_frames
@@ -258,3 +260,10 @@ def test_too_many_boxes_and_boxes_alone_are_refused(
     boxes_alone = replace(read_recording(room), sources=(CameraSource(Source("boxes", room.parent / "boxes.csv")),) * 4)
     room.write_text(format_rig(boxes_alone, room))
     assert re.search("boxes alone, expected a camera that delivers", refusal("detect", room, "-o", tmp_path / "boxes"))
+
+
+def test_boxes_that_another_run_writes_are_left_alone(tmp_path: Path) -> None:
+    first, second = (KeptFile(tmp_path / "corner0.csv", {}, False) for _ in range(2))
+    first.begin(b"frame\n", False)
+    refused(OutputError, "another run", second.begin, b"frame\n", False)
+    first.close()

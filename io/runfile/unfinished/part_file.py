@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import IO
+from typing import IO, BinaryIO
 
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import create_part, output_error, parts_of, publish_part
@@ -197,3 +197,14 @@ else:
             raise
         except OSError:
             pass  # a file system without locks
+
+
+def locked_file(path: Path) -> BinaryIO:
+    """A file of ours, made where there is none, which `lock` holds; links are not followed."""
+    file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666), "r+b")
+    try:
+        lock(file)
+    except OSError:
+        file.close()
+        raise
+    return file

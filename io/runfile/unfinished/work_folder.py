@@ -33,7 +33,7 @@ from stseg.io.outputs.whole_files import (
 )
 from stseg.io.recording.aligned_stream import StreamIndex
 from stseg.io.recording.recording import Recording
-from stseg.io.runfile.unfinished.part_file import lock
+from stseg.io.runfile.unfinished.part_file import locked_file
 from stseg.io.runfile.unfinished.work_files import (
     FinishedSegments,
     finished_segments,
@@ -73,7 +73,7 @@ class WorkFolder:
     def __enter__(self) -> Self:
         try:
             self._make()
-            self._lock = _locked(self.path / "lock")
+            self._lock = locked_file(self.path / "lock")
         except OSError as error:
             raise output_error(self.output, error) from error
         try:
@@ -258,23 +258,6 @@ def _is_deletable(folder: Path) -> bool:
     """Whether a folder holds our mark and else only what a published run leaves; or nothing, where a kill came last."""
     names = {path.name for path in folder.iterdir()}
     return names <= _PUBLISHED_FILES and (not names or is_regular(folder / _MARK))
-
-
-def _locked(path: Path) -> BinaryIO:
-    """A file of ours, locked; OSError where another process has it."""
-    opened = _open_own(path)
-    try:
-        lock(opened)
-    except OSError:
-        opened.close()
-        raise
-    return opened
-
-
-def _open_own(path: Path) -> BinaryIO:
-    """A file of ours, made where there is none; links are not followed."""
-    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
-    return os.fdopen(os.open(path, flags, 0o666), "r+b")
 
 
 class Difference(NamedTuple):
