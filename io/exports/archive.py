@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Rows, by_track
 from stseg.errors import printable
 from stseg.io.exports.row_counts import require_sound_pages
 from stseg.io.extras import load_extra
@@ -127,11 +127,8 @@ def _place_rows(run: Run, recording: str) -> Iterator[tuple[object, ...]]:
 
 def _path_lengths(trajectory: Rows) -> dict[int, float]:
     """Length of each track's path, metres."""
-    rows = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    ids, place = np.unique(rows["id"], return_inverse=True)
-    offset: list[Floats] = [np.diff(rows[axis]) for axis in ("x", "y")]
-    steps = np.hypot(*offset) * (np.diff(rows["id"]) == 0)
-    return dict(zip(ids.tolist(), np.bincount(place[1:], steps, len(ids)).tolist(), strict=True))
+    tracks = by_track(trajectory)
+    return {int(rows["id"][0]): float(np.hypot(np.diff(rows["x"]), np.diff(rows["y"])).sum()) for rows in tracks}
 
 
 def _track(run: Run, recording: str, row: np.void, distance: float) -> tuple[object, ...]:

@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Rows, by_track
 from stseg.geometry import Camera
 from stseg.io.exports.benchmarks import write_zip
 from stseg.io.outputs.whole_files import MARK
@@ -110,7 +110,5 @@ def _keyframes(rows: Rows, size: tuple[int, int], frame_rate: float) -> list[dic
 
 def _tracks(run: Run, view: int) -> Iterator[tuple[int, Rows]]:
     """Boxes of one view, track by track in the order of frames."""
-    boxes = run.boxes[run.boxes["view"] == view]
-    boxes = boxes[np.lexsort((boxes["frame"], boxes["id"]))]
-    for identity in np.unique(boxes["id"]).tolist():
-        yield identity, boxes[boxes["id"] == identity]
+    for rows in by_track(run.boxes[run.boxes["view"] == view]):
+        yield int(rows["id"][0]), rows
