@@ -14,10 +14,9 @@ from cyclopts import App, CycloptsError, MissingArgumentError
 
 from stseg.commands.terminal.standard_error import patience, without_library_messages
 from stseg.commands.terminal.termination import INTERRUPTED, TERMINATED, Termination
-from stseg.engine.workers.garbage import collect_rarely
 from stseg.errors import ConfigError, StsegError, printable
 from stseg.import_path import leave_out_current_folder
-from stseg.io.machine import address_space
+from stseg.io.machine import address_space, collect_rarely
 from stseg.version import __version__
 
 COMMANDS = {

@@ -9,7 +9,7 @@ signal.setitimer(signal.ITIMER_REAL, 0.001, 0.5)  # imports take seconds; meanwh
 
 from stseg.engine.offline import assembly  # noqa: E402
 from stseg.engine.workers import local_workers  # noqa: E402
-from stseg.engine.workers.garbage import collect_rarely  # noqa: E402
+from stseg.io.machine import collect_rarely  # noqa: E402
 from stseg.kernels.accelerate import load_cached_kernels  # noqa: E402
 
 __all__ = ["assembly", "local_workers"]
