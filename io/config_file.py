@@ -66,11 +66,6 @@ def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Conf
     return build(Config, given, place)
 
 
-def format_config(config: Config) -> str:
-    """The whole configuration as TOML; `read_config` of it gives back the same."""
-    return as_toml(config)
-
-
 def describe_config(config: Config, *, expert: bool) -> str:
     """The configuration as TOML with a comment above each key; `read_config` of it gives back the same.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.arrays import Flags, Floats, Ints, Rows, repeated_rows
 from stseg.errors import FormatError
 from stseg.io.outputs.whole_files import replacing, require_output
 from stseg.io.untrusted import limits
@@ -57,7 +57,7 @@ def read_tracks_csv(path: Path) -> Rows:
     table["x"], table["y"] = sheet.numbers("x"), sheet.numbers("y")
     if "flag" in sheet.cells:
         table["flag"] = sheet.whole("flag", empty="0")
-    sheet.refuse(_repeats(table), "id", "an id once a frame", "{} again in the same frame")
+    sheet.refuse(repeated_rows(table, ("frame", "id")), "id", "an id once a frame", "{} again in the same frame")
     _refuse_crowds(path, table)
     return table
 
@@ -158,12 +158,3 @@ def _refuse_crowds(path: Path, table: Rows) -> None:
     if counts.max(initial=0) > limits.PEOPLE_PER_FRAME:
         place = f"frame {frames[counts.argmax()]}"
         raise FormatError(path, place, f"{counts.max()} rows", f"at most {limits.PEOPLE_PER_FRAME} people in a frame")
-
-
-def _repeats(table: Rows) -> Flags:
-    """Rows whose frame and id stand in an earlier row, bool (n,)."""
-    order = np.lexsort((table["id"], table["frame"]))
-    frame, identity = table["frame"][order], table["id"][order]
-    repeats = np.zeros(len(table), bool)
-    repeats[order[1:]] = (frame[1:] == frame[:-1]) & (identity[1:] == identity[:-1])
-    return repeats

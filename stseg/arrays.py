@@ -7,6 +7,7 @@ plane, `pixel` is image coordinates, `cell` is an index into the grid.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,16 +33,24 @@ def by_track(table: Rows) -> list[Rows]:
     return np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(table) else []
 
 
+def repeated_rows(table: Rows, names: Sequence[str]) -> Flags:
+    """Rows whose values in these columns stand in an earlier row, bool (n,)."""
+    keys, repeats = [table[name] for name in names], np.zeros(len(table), bool)
+    order = np.lexsort(keys)
+    repeats[order[1:]] = np.logical_and.reduce([key[order[1:]] == key[order[:-1]] for key in keys])
+    return repeats
+
+
 def ground_of(rows: Rows) -> Floats:
     """Ground points x and y of rows, metres, float64 (n, 2)."""
     return np.column_stack([rows["x"], rows["y"]]).astype(float, copy=False)
 
 
-def some_columns(table: Rows, dtype: np.dtype[np.void], order: Ints | None = None) -> Rows:
-    """A copy of the columns of a dtype, the rows in an order."""
+def some_columns(table: Rows, dtype: np.dtype[np.void]) -> Rows:
+    """A copy of the columns of a dtype."""
     rows = np.empty(len(table), dtype)
     for name in dtype.names or ():
-        rows[name] = table[name] if order is None else table[name][order]
+        rows[name] = table[name]
     return rows
 
 

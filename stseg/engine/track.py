@@ -22,7 +22,7 @@ from stseg.engine.workers.workforce import Workforce
 from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.identities.association import NO_KNOWN_PEOPLE
-from stseg.io.config_file import format_config
+from stseg.io.config_file import as_toml
 from stseg.io.machine import return_freed_memory
 from stseg.io.outputs.whole_files import Inputs
 from stseg.io.recording.aligned_stream import StreamIndex, index_streams
@@ -137,7 +137,7 @@ def track_recording(
     WorkFolder(output, {}).require_output(overwrite, Inputs(recording_files(recording), [known]))
     recording = with_boxes(recording, output.with_name(f"{output.name}.boxes"), reporter, overwrite)
     people = NO_KNOWN_PEOPLE if known is None else read_known(known, config)
-    request = run_request(recording, gather_provenance(recording, format_config(config)))
+    request = run_request(recording, gather_provenance(recording, as_toml(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
     request |= {"--known": "nothing" if known is None else digest(people)}
     work = WorkFolder(output, request)

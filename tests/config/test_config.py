@@ -15,7 +15,7 @@ from stseg.config import BodyConfig, Config
 from stseg.config.keys import USER_KEYS, describe, require_effect, values
 from stseg.config.ranges import require
 from stseg.errors import ConfigError
-from stseg.io.config_file import Given, as_toml, build, describe_config, format_config, read_config
+from stseg.io.config_file import Given, as_toml, build, describe_config, read_config
 
 TOML = """
 [detection]
@@ -68,7 +68,7 @@ def test_files_and_assignments_differ_and_read_back_equal(tmp_path: Path) -> Non
     assert config == replace(Config(), body=BodyConfig(heights=(1.5, 1.75)), detection=expected)
     assert isinstance(read(tmp_path / "c.toml", TOML).detection.prior_log_odds, float)
     config = read_config(None, ["detection.prior_log_odds=-1e-3", "body.heights=[1, 1.25]"])
-    text = format_config(config)
+    text = as_toml(config)
     assert read(tmp_path / "c.toml", text) == config
     table = tomllib.loads(text)
     assert list(table) == [stage.name for stage in fields(Config)]

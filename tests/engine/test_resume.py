@@ -22,7 +22,7 @@ from recordings import COMMAND, FRAMES, PLACES, assert_same, process, run_words,
 from scenes import walkers
 
 from stseg import Config, evaluate, read_run
-from stseg.io.config_file import format_config
+from stseg.io.config_file import as_toml
 from stseg.io.runfile.unfinished.work_files import checksum
 
 SLOW_DISK = """
@@ -202,7 +202,7 @@ def sources_exchanged(folder: Path, chance: random.Random) -> tuple[str, ...]:
 
 
 def configuration_changed(_folder: Path, chance: random.Random) -> tuple[str, ...]:
-    numbers = [line.split(" ") for line in format_config(Config()).splitlines() if re.match(r"\[|\w+ = \d+\.\d", line)]
+    numbers = [line.split(" ") for line in as_toml(Config()).splitlines() if re.match(r"\[|\w+ = \d+\.\d", line)]
     section, keys = "", []
     for words in numbers:
         section = words[0].strip("[]") if words[0].startswith("[") else section

@@ -1,7 +1,7 @@
 """Checks of a run file: its layout before anything is read, the values of a table when it is read."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from stseg.arrays import AnyArray, Flags, Floats, Ints, Rows
+from stseg.arrays import AnyArray, Flags, Floats, Ints, Rows, repeated_rows
 from stseg.errors import FormatError
 from stseg.io.runfile import layout
 from stseg.io.runfile.reading.hdf5_reading import read_attribute
@@ -32,6 +32,8 @@ _RANGES: dict[str, tuple[int, int]] = {
 """Columns of whole numbers; `view` counts the cameras."""
 _PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "height"), "ghosts": ("x", "y", "evidence")}
 """Columns that must be finite; others may be NaN where nothing is known."""
+_KEYS = {"trajectory": ("id", "frame"), "boxes": ("id", "frame", "view"), "known_people": ("id",)}
+"""Columns whose values together stand in one row at most."""
 _NOT_NEGATIVE = ("xx", "yy", "height", "width", "extent", "seconds", *ERROR_RATES)
 """Variances, sizes, durations and rates."""
 
@@ -133,10 +135,9 @@ def require_table(bounds: Bounds, name: str, rows: Rows) -> Rows:
             row = int(np.argmax(wrong.reshape(len(rows), -1).any(axis=1)))
             found = str(rows[column][row])[: limits.NAME]
             raise FormatError(bounds.path, f"/{name}, {column}, row {row}", found, expected)
-    if name in ("trajectory", "boxes") and _repeated(rows):
-        raise FormatError(bounds.path, f"/{name}", "a track twice in a frame", "once, or once a view")
-    if name == "known_people" and _repeated(rows):
-        raise FormatError(bounds.path, "/known_people", "a person twice", "each once")
+    if name in _KEYS and repeated_rows(rows, _KEYS[name]).any():
+        of_people, of_tracks = ("a person twice", "each once"), ("a track twice in a frame", "once, or once a view")
+        raise FormatError(bounds.path, f"/{name}", *(of_people if name == "known_people" else of_tracks))
     return rows
 
 
@@ -164,15 +165,6 @@ def _unprintable(values: AnyArray) -> Flags:
     kinds, index = np.unique(values, return_inverse=True)
     escaped = [bytes(text).decode("utf-8", "surrogateescape") for text in kinds]  # escapes are not printable
     return np.array([not text.isprintable() for text in escaped], bool)[index]
-
-
-def _repeated(rows: Rows) -> bool:
-    keys: Sequence[AnyArray] = [rows[key] for key in ("id", "frame", "view") if key in (rows.dtype.names or ())]
-    order = np.lexsort(keys)
-    same = np.ones(max(0, len(rows) - 1), bool)
-    for key in keys:
-        same &= key[order][1:] == key[order][:-1]
-    return bool(same.any())
 
 
 def require_consistency(bounds: Bounds, trajectory: Rows, boxes: Rows, tracks: Rows) -> None:

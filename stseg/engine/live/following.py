@@ -24,7 +24,7 @@ from stseg.engine.rig_body import with_body_of
 from stseg.engine.stopping import stop_asked
 from stseg.engine.track import resumable
 from stseg.errors import ConfigError, SourceError
-from stseg.io.config_file import format_config
+from stseg.io.config_file import as_toml
 from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
@@ -85,7 +85,7 @@ def follow_recording(
     require_memory(recording.rig, config, recording.path)
     is_live(recording)  # raises where the sources cannot be followed
     job = Job(recording, config, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
-    request = run_request(recording, gather_provenance(recording, format_config(config)))
+    request = run_request(recording, gather_provenance(recording, as_toml(config)))
     request |= {"--tracker": tracker, "--volume": volume, "--follow": "yes"}
     del request["source"], request["samples of source"]  # the files change during the run
     work, table = WorkFolder(output, request), live_table_of(output)

@@ -14,7 +14,7 @@ from stseg.engine.offline.calls import Caller, called_here
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
 from stseg.engine.pipeline import box_tables, finished_tracks
-from stseg.io.config_file import format_config
+from stseg.io.config_file import as_toml
 from stseg.io.machine import return_freed_memory
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
@@ -112,7 +112,7 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
     """
     return_freed_memory()  # of tracking
     views = read_run(finished[0].path).views
-    config, recording = format_config(job.config), with_alignment(job.recording, job.streams.frame_at_tick)
+    config, recording = as_toml(job.config), with_alignment(job.recording, job.streams.frame_at_tick)
     with (
         call(_associated, job, finished) as association,
         RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Rows, columns, some_columns
 from stseg.config import Config
 from stseg.errors import ConfigError, FormatError
 from stseg.identities.evidence.returns import known_people
@@ -14,7 +14,7 @@ from stseg.io.untrusted import limits
 
 _LAST_ID = limits.FRAMES // 2
 """Greatest id of a known person."""
-_PLACE = [("frame", "<i8"), ("raw_x", "<f8"), ("raw_y", "<f8")]
+_PLACE = columns("frame:<i8 raw_x:<f8 raw_y:<f8")
 
 
 def read_known(path: Path, config: Config) -> Rows:
@@ -47,18 +47,10 @@ def rows_with_ids(run: Run) -> Rows:
     """Committed rows with the ids of the run's tracks, 0 for none; rows of tracks keep the raw places."""
     rows = run.committed.copy()
     rows["id"] = 0
-    tracked, committed = (_places(table) for table in (run.trajectory, run.committed))
+    tracked, committed = (some_columns(table, _PLACE) for table in (run.trajectory, run.committed))
     _, index, row = np.intersect1d(tracked, committed, return_indices=True)
     rows["id"][row] = run.trajectory["id"][index]
     return rows
-
-
-def _places(table: Rows) -> Rows:
-    """Frame and raw place of each row."""
-    places = np.zeros(len(table), _PLACE)
-    for name, _ in _PLACE:
-        places[name] = table[name]
-    return places
 
 
 def digest(people: Rows) -> str:

@@ -13,7 +13,7 @@ from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
 from stseg.geometry.nearest_person import nearest_person
-from stseg.io.config_file import format_config
+from stseg.io.config_file import as_toml
 from stseg.io.runfile.layout import ghost_type
 from stseg.io.runfile.packed_frames import PackedFrame
 from stseg.io.runfile.run_writer import packed_volume
@@ -62,7 +62,7 @@ class SegmentWriter(ExitStack):
         self._job, self._draft = job, draft
         self._steps = deque[_PendingFrames]()
         self._writer = self.enter_context(
-            RunWriter(draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume)
+            RunWriter(draft, job.recording, views, as_toml(job.config), overwrite=True, kept=job.volume)
         )
 
     def write(self, step: CommittedFrames, events: Rows | None = None, executor: Executor | None = None) -> None:
