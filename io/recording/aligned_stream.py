@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -136,7 +137,7 @@ def recording_length(streams: list[AlignedStream]) -> float:
     required = [stream for stream in streams if stream.required]
     if not required:
         return max(stream.end for stream in streams)
-    shortest, longest = min(required, key=_end), max(required, key=_end)
+    shortest, longest = min(required, key=attrgetter("end")), max(required, key=attrgetter("end"))
     if shortest.end < longest.end:
         by_time = any(stream.source.frame_at_tick is not None for stream in (shortest, longest))
         raise SourceError(
@@ -147,10 +148,6 @@ def recording_length(streams: list[AlignedStream]) -> float:
             + (', or clock = "count" where time stamps were used' if by_time else ""),
         )
     return shortest.end
-
-
-def _end(stream: AlignedStream) -> float:
-    return stream.end
 
 
 @dataclass(frozen=True)

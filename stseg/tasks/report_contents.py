@@ -158,8 +158,7 @@ def _busy_figures(run: Run, span: Span) -> list[Figure]:
 
 
 def _view_summaries(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:
-    rejections: Rows = run.ghosts[run.ghosts["status"] == 1]
-    rig, parts = run.recording.rig, np.nan_to_num(rejections["parts"])
+    rig, parts = run.recording.rig, np.nan_to_num(run.detections["parts"])
     view_summaries = []
     for view, camera in enumerate(rig.cameras):
         evidence = parts[:, view][has_evidence(parts[:, view])]

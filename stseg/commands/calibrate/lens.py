@@ -1,5 +1,6 @@
 """`stseg calibrate lens`: camera matrix and lens from a video of a checkerboard."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -57,14 +58,12 @@ def calibrate_lens(
     camera = uncalibrated_camera(video.stem, video)
     stream, size = open_stream(Source("video", video), camera), camera.size
     found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []
-    try:
+    with closing(stream):
         while isinstance(view := stream.read(), np.ndarray):
             corners = find_corners(np.asarray(view, np.uint8), sides)
             if corners is not None and all(np.abs(corners - one).mean() > _WORTH * size[0] for one in found):
                 found.append(corners)
             stream.skip(every - 1)
-    finally:
-        stream.close()
     fit = fit_lens(str(video), found, sides, size)
     write_opencv_lens(output, fit.lens, overwrite)
     focal, (u, v) = fit.lens.matrix[0, 0], fit.lens.matrix[:2, 2]

@@ -1,6 +1,7 @@
 """`stseg calibrate page`: a page on which ground points are clicked."""
 
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
@@ -72,7 +73,7 @@ def _frames(path: Path, chosen: tuple[int, ...]) -> list[Bytes]:
         return [read_colour(path)]
     found: list[Bytes] = []
     stream, place = open_stream(Source("video", path), uncalibrated_camera(path.stem, path)), 0
-    try:
+    with closing(stream):
         for number in sorted(set(chosen or _DEFAULT_FRAMES)):
             view = stream.read() if stream.skip(number - place) == number - place else None
             place = number + 1
@@ -82,8 +83,6 @@ def _frames(path: Path, chosen: tuple[int, ...]) -> list[Bytes]:
                 raise SourceError(path, "--frame", number, "a frame of the video")
             else:
                 break
-    finally:
-        stream.close()
     return found
 
 
