@@ -26,16 +26,17 @@ _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _INDEXED = 0, 3
 
 
-def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) -> AnyArray:
+def read_picture(path: Path, kind: SourceKind, size: tuple[int, int] | None, key: str) -> AnyArray:
     """One image file as an observation of a kind.
 
     video or images: uint8 (v, u, 3) BGR; masks: uint8 (v, u); instances: uint16 (v, u). `size` is the width and
-    height that it must have, pixels, `key` the camera and frame, for errors. SourceError where the file cannot be
-    read or decoded, or is not of that kind or size.
+    height that it must have, pixels, None for any, `key` the camera and frame, for errors. SourceError where the file
+    cannot be read or decoded, or is not of that kind or size.
     """
     with reading(path, "an image", SourceError, key):
         data = read_bytes(path, _MOST_BYTES)
     declared = declared_size(data)
+    size = size or declared or (0, 0)
     if declared is not None and sorted(declared) != sorted(size):  # Exif may turn it
         found, expected = f"an image of {declared[0]}x{declared[1]}", f"{size[0]}x{size[1]}, the size of the camera"
         raise SourceError(path, key, found, expected)
@@ -60,9 +61,7 @@ def declared_size(data: bytes) -> tuple[int, int] | None:
 
 def read_colour(path: Path) -> Bytes:
     """One image file in colour, uint8 (v, u, 3); raises as `read_picture` does."""
-    with reading(path, "an image", SourceError):
-        size = declared_size(read_bytes(path, _MOST_BYTES))
-    return np.asarray(read_picture(path, "images", size or (0, 0), ""), np.uint8)
+    return np.asarray(read_picture(path, "images", None, ""), np.uint8)
 
 
 def reduced_view(view: Observation, factor: int) -> Observation:
