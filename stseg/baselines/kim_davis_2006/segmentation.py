@@ -23,7 +23,7 @@ class Canvas(NamedTuple):
     """Buffers for the segmentation of one view; only boxes around people are kept up to date."""
 
     label: Labels
-    """int32 (v, u): the likeliest person, UNASSIGNED for none."""
+    """int32 (v, u): the likeliest person, NO_PERSON for none."""
     best: Singles
     total: Singles
     """float32 (v, u) each: p(k) P(x | k) of that person, and the sum over all people."""
@@ -113,7 +113,7 @@ def fill_unoccluded(
     free : float32 (v, u)
         Scratch buffer.
     owner : int32 (v, u)
-        Filled within the boxes with the number of parts times the person, plus the part, or UNASSIGNED.
+        Filled within the boxes with the number of parts times the person, plus the part, or NO_PERSON.
     unoccluded : int64 (n,)
         Filled with the number of pixels that each person covers and no nearer person does.
     """
