@@ -154,7 +154,7 @@ class RunFilm:
             path = recent[recent["id"] == row["id"]]
             opacity = 1 - 0.85 * (frame - path["frame"][:-1]) / max(self._trail, 1)
             colour = track_colour(int(row["id"]))
-            fading_stroke(canvas, plan.pixel(ground_of(path)), colour, 3, opacity)
+            fading_stroke(canvas, plan.pixel(ground_of(path)), colour, opacity)
             disc(canvas, place, 8, PAPER)
             disc(canvas, place, 6.5, colour)
         ids = present["id"].tolist()

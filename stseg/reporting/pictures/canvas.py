@@ -30,7 +30,8 @@ def stroke(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, opac
         if opacity >= 1:
             cv2.polylines(canvas, [_fixed(run)], False, colour, width, cv2.LINE_AA, _SHIFT)
         else:
-            _blend_stroke(canvas, run, colour, width, opacity)
+            for mask, origin in _blended(canvas, run, width + 1, colour, opacity):
+                cv2.polylines(mask, [_fixed(run - origin)], False, 255, width, cv2.LINE_AA, _SHIFT)
 
 
 def dashes(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, on: float = 7.0, off: float = 6.0) -> None:
@@ -40,20 +41,16 @@ def dashes(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, on: 
             cv2.polylines(canvas, [_fixed(piece)], False, colour, width, cv2.LINE_AA, _SHIFT)
 
 
-def fading_stroke(canvas: Bytes, points: AnyArray, colour: Colour, width: int, opacities: AnyArray) -> None:
-    """An open polyline with an opacity for each piece, 0..1, one fewer than points."""
+def fading_stroke(canvas: Bytes, points: AnyArray, colour: Colour, opacities: AnyArray) -> None:
+    """An open polyline, three pixels wide, with an opacity for each piece, 0..1, one fewer than points."""
     points = np.asarray(points, float)
     finite: Flags = np.asarray(np.isfinite(points).all(axis=1))
     if not finite.any():
         return
-    part, origin = _part(canvas, points[finite], width + 1)
-    if not part.size:
-        return
-    mask = np.zeros(part.shape[:2], np.uint8)
-    for k in np.flatnonzero(finite[1:] & finite[:-1]):
-        piece = _fixed(points[k : k + 2] - origin)
-        cv2.polylines(mask, [piece], False, round(255 * float(opacities[k])), width, cv2.LINE_AA, _SHIFT)
-    blend(part, mask, colour, 1.0)
+    for mask, origin in _blended(canvas, points[finite], 4, colour, 1.0):
+        for k in np.flatnonzero(finite[1:] & finite[:-1]):
+            piece = _fixed(points[k : k + 2] - origin)
+            cv2.polylines(mask, [piece], False, round(255 * float(opacities[k])), 3, cv2.LINE_AA, _SHIFT)
 
 
 def outline(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1) -> None:
@@ -66,11 +63,8 @@ def fill(canvas: Bytes, points: AnyArray, colour: Colour, opacity: float = 1.0) 
     if opacity >= 1:
         cv2.fillPoly(canvas, [_fixed(points)], colour, cv2.LINE_AA, _SHIFT)
         return
-    part, origin = _part(canvas, points, 1)
-    if part.size:
-        mask = np.zeros(part.shape[:2], np.uint8)
+    for mask, origin in _blended(canvas, points, 1, colour, opacity):
         cv2.fillPoly(mask, [_fixed(np.asarray(points) - origin)], 255, cv2.LINE_AA, _SHIFT)
-        blend(part, mask, colour, opacity)
 
 
 def disc(canvas: Bytes, place: AnyArray, radius: float, colour: Colour) -> None:
@@ -164,21 +158,19 @@ def _dashed(run: Floats, on: float, off: float) -> Iterator[Floats]:
         yield np.stack([np.interp(at, along, run[:, 0]), np.interp(at, along, run[:, 1])], -1)
 
 
-def _blend_stroke(canvas: Bytes, run: Floats, colour: Colour, width: int, opacity: float) -> None:
-    part, origin = _part(canvas, run, width + 1)
-    if part.size:
-        mask = np.zeros(part.shape[:2], np.uint8)
-        cv2.polylines(mask, [_fixed(run - origin)], False, 255, width, cv2.LINE_AA, _SHIFT)
-        blend(part, mask, colour, opacity)
-
-
-def _part(canvas: Bytes, points: AnyArray, margin: int) -> tuple[Bytes, Ints]:
-    """The part of a canvas around points, and where it begins (u, v)."""
+def _blended(
+    canvas: Bytes, points: AnyArray, margin: int, colour: Colour, opacity: float
+) -> Iterator[tuple[Bytes, Ints]]:
+    """The mask of the part of a canvas around points, if any, and where it begins (u, v): what is drawn is blended."""
     points = np.asarray(points, float)
     limit = np.array([canvas.shape[1], canvas.shape[0]])
     low = np.clip(np.floor(points.min(axis=0)) - margin, 0, limit).astype(int)
     high = np.clip(np.ceil(points.max(axis=0)) + margin + 1, 0, limit).astype(int)
-    return canvas[low[1] : high[1], low[0] : high[0]], low
+    part = canvas[low[1] : high[1], low[0] : high[0]]
+    if part.size:
+        mask = np.zeros(part.shape[:2], np.uint8)
+        yield mask, low
+        blend(part, mask, colour, opacity)
 
 
 def _rounded(centre: tuple[float, float], width: float, height: float) -> Floats:

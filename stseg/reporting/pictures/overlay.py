@@ -143,7 +143,7 @@ def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail:
     pixel = view.pixel(ground_of(rows), 0.0)
     colour = track_colour(int(rows["id"][0]))
     age = (frame - rows["frame"][:-1]) / max(trail, 1)
-    fading_stroke(canvas, pixel, colour, 3, 1 - 0.85 * age)
+    fading_stroke(canvas, pixel, colour, 1 - 0.85 * age)
 
 
 def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
