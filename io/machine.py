@@ -13,6 +13,8 @@ except ImportError:  # Windows has no such limits
     resource = None  # type: ignore[assignment]
 
 _ENDLESS = 1 << 62
+_GROWTH = 1 << 30
+"""Bytes: texts have at most 2^24, and threads beside want some."""
 _COLLECTION = 100_000, 20, 100
 """Objects made and not freed at which the youngest are visited, and how many such visits lead to one of the older."""
 
@@ -26,12 +28,12 @@ def address_space() -> int:
 
 
 @contextmanager
-def bounded_growth(most: int) -> Iterator[None]:
-    """Within, the process cannot take more than `most` bytes of memory beyond what it has; Linux alone knows that.
+def bounded_growth() -> Iterator[None]:
+    """Within, the process cannot take more than a gigabyte of memory beyond what it has; Linux alone knows that.
 
     For libraries that ask for as much as a file says; threads beside share the bound.
     """
-    bound = _held() + most
+    bound = _held() + _GROWTH
     if bound >= min(address_space(), _ENDLESS):
         yield
         return

@@ -63,12 +63,12 @@ class Table:
             raise self.error(name, abbreviated(value), EXPECTED)
         return value
 
-    def paths(self, name: str) -> list[str]:
-        """Paths or addresses: a text or a list of texts."""
-        values = self.texts(name)
+    def paths(self) -> list[str]:
+        """Paths or addresses of the key `path`: a text or a list of texts."""
+        values = self.texts("path")
         for value in values:
             if not is_path(value):
-                raise self.error(name, abbreviated(value), "a path that a file system takes")
+                raise self.error("path", abbreviated(value), "a path that a file system takes")
         return values
 
     def texts(self, name: str) -> list[str]:

@@ -44,11 +44,11 @@ class ForeignTable(Table):
         flat = isinstance(value, list) and not any(isinstance(row, list) for row in value)
         return self.numbers(name, rows * columns).reshape(rows, columns) if flat else self.numbers(name, rows, columns)
 
-    def vector(self, name: str, length: int) -> Floats:
-        """A vector in one list, or in a list of lists of one; float64 (length,)."""
+    def vector(self, name: str) -> Floats:
+        """A vector in one list, or in a list of lists of one; float64 (3,)."""
         value = self.values.get(name)
         nested = isinstance(value, list) and any(isinstance(row, list) for row in value)
-        return self.numbers(name, length, 1)[:, 0] if nested else self.numbers(name, length)
+        return self.numbers(name, 3, 1)[:, 0] if nested else self.numbers(name, 3)
 
 
 def camera_from_pose(

@@ -55,9 +55,9 @@ def _poses(top: ForeignTable) -> Iterator[ForeignCamera]:
         fisheye = bool(table.values.get("fisheye"))
         name = str(table.values.get("name", table.values.get("cam_id", table.place.rpartition(".")[2])))
         size = table.image_size("size") if "size" in table else None
-        rotation = np.asarray(Rotation.from_rotvec(table.vector("rotation", 3)).as_matrix())
+        rotation = np.asarray(Rotation.from_rotvec(table.vector("rotation")).as_matrix())
         distortion = table.numbers("distortions", ANY) if "distortions" in table else np.zeros(5)
-        translation, matrix = table.vector("translation", 3), table.matrix("matrix", 3, 3)
+        translation, matrix = table.vector("translation"), table.matrix("matrix", 3, 3)
         yield camera_from_pose(top.file, name, size, matrix, rotation, translation, distortion, fisheye)
 
 

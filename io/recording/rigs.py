@@ -233,7 +233,7 @@ def _source(table: Table, *more_keys: str) -> Source:
     unused = [key for key in ("features", "classes", "score") if key in table and detector is None and not detections]
     if unused:
         raise table.error(unused[0], f"{unused[0]} of no boxes", "a detector beside them")
-    paths = table.paths("path")
+    paths = table.paths()
     if any("://" in name for name in paths):
         return _live_source(table, kind)
     first, *more = [table.file.parent / name for name in paths]
@@ -260,7 +260,7 @@ def _source(table: Table, *more_keys: str) -> Source:
 
 def _detector(table: Table) -> Path:
     """The model of a detector, or the one that needs no file."""
-    if "starts" in table or any("://" in name for name in table.paths("path")):
+    if "starts" in table or any("://" in name for name in table.paths()):
         found = "a detector of files with gaps between them" if "starts" in table else "a detector of a live stream"
         raise table.error("detector", found, "files that follow one another, or no detector")
     name = table.text("detector")
@@ -273,7 +273,7 @@ def _columns(table: Table) -> tuple[tuple[str, str], ...]:
 
 
 def _live_source(table: Table, kind: SourceKind) -> Source:
-    address, *more = table.paths("path")
+    address, *more = table.paths()
     if kind != "video" or more:
         found = f"{address} of kind {kind}" if kind != "video" else f"{len(more) + 1} streams"
         raise table.error("path", found, "one address, of kind video")

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Bytes, Flags, Floats, Ints, Rows, ground_of
+from stseg.arrays import Bytes, Flags, Floats, Ints, Rows, by_track, ground_of
 from stseg.records.point_probability import point_probability
 
 DOUBT_LIMIT = 0.9
@@ -144,12 +144,12 @@ def people_by_hour(span: Span, trajectory: Rows) -> list[BusyTime]:
     return _parts(span, trajectory, _HOUR)
 
 
-def busiest_minutes(span: Span, trajectory: Rows, most: int = 3) -> list[BusyTime]:
-    """The minutes of a long run with most people, the earlier first where they are equal; in order of time."""
+def busiest_minutes(span: Span, trajectory: Rows) -> list[BusyTime]:
+    """The three minutes of a long run with most people, the earlier first where they are equal; in order of time."""
     if (span.stop - span.first) / span.frame_rate < _LONG_RUN:
         return []
     minutes = _parts(span, trajectory, _MINUTE)
-    busiest = sorted(minutes, key=lambda one: (-one.mean, one.first))[:most]
+    busiest = sorted(minutes, key=lambda one: (-one.mean, one.first))[:3]
     return sorted((one for one in busiest if one.mean > 0), key=lambda one: one.first)
 
 
@@ -157,9 +157,7 @@ def _parts(span: Span, trajectory: Rows, seconds: float) -> list[BusyTime]:
     length = max(1, round(seconds * span.frame_rate))
     edges: Ints = np.append(np.arange(span.first, span.stop, length), span.stop)
     counts = np.bincount(trajectory["frame"] - span.first, minlength=span.stop - span.first)
-    order = np.lexsort((trajectory["frame"], trajectory["id"]))
-    _, first_rows = np.unique(trajectory["id"][order], return_index=True)
-    begun, _ = np.histogram(trajectory["frame"][order][first_rows].astype(float), edges)
+    begun, _ = np.histogram([float(rows["frame"][0]) for rows in by_track(trajectory)], edges)
     return [
         BusyTime(first, stop, float(counts_of_part.mean()), int(counts_of_part.max()), int(new))
         for first, stop, new in zip(edges[:-1].tolist(), edges[1:].tolist(), begun.tolist(), strict=True)

@@ -101,7 +101,7 @@ class VideoStream:
     def _open(self) -> None:
         self._capture = open_video(self._source.path, f"camera {self._camera.name}")
         if not self._capture.isOpened():
-            raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
+            raise self._error("a file that does not open as a video")
         self._frame, self._ended = -1, False
         self._by_packets = self._by_packets and deliver_packets(self._capture)
 
@@ -146,7 +146,7 @@ class VideoStream:
             self._decode_from(self._frame)  # whether this packet is a frame is for FFmpeg to say
             self._ended = not self._grab()
         if self._ended and self._frame < 0:
-            raise self._error("no frame that decodes", "a video that FFmpeg decodes")
+            raise self._error("no frame that decodes")
         self._frame += not self._ended
         return not self._ended
 
@@ -156,5 +156,5 @@ class VideoStream:
         self._packet = np.asarray(packet, np.uint8).reshape(-1) if is_valid else np.zeros(0, np.uint8)
         return self._heads.fits(self._packet)
 
-    def _error(self, found: str, expected: str) -> SourceError:
-        return SourceError(self._source.path, f"camera {self._camera.name}", found, expected)
+    def _error(self, found: str) -> SourceError:
+        return SourceError(self._source.path, f"camera {self._camera.name}", found, "a video that FFmpeg decodes")

@@ -82,10 +82,10 @@ class LayoutChecks:
         if not (np.abs(values) <= limits.METRES).all():
             raise FormatError(self.path, name, "a coordinate that is not finite", f"metres up to {limits.METRES:g}")
 
-    def require_value(self, name: str, key: str, expected: str | int) -> None:
-        found = self.attribute(name, key, repr(expected))
+    def require_value(self, key: str, expected: str | int) -> None:
+        found = self.attribute("/", key, repr(expected))
         if np.shape(found) or found != expected:
-            raise FormatError(self.path, f"{name}@{key}", abbreviated(found), repr(expected))
+            raise FormatError(self.path, f"/@{key}", abbreviated(found), repr(expected))
 
     def require_dataset(self, name: str, dtype: np.dtype[np.generic], dimensions: int) -> h5py.Dataset:
         """A dataset of that dtype and so many dimensions."""

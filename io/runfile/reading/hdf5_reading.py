@@ -17,8 +17,6 @@ from stseg.io.machine import bounded_growth
 from stseg.io.untrusted.safe_hdf5 import open_hdf5
 
 T = TypeVar("T")
-_GROWTH = 1 << 30
-"""Bytes: texts have at most 2^24, and threads beside want some."""
 
 
 def read_object(path: Path, place: str, take: Callable[[h5py.File], T]) -> T:
@@ -47,7 +45,7 @@ def format_errors(path: Path, place: str) -> Iterator[None]:
 
 def dataset_text(dataset: h5py.Dataset) -> str:
     """A single text, with bytes that are no UTF-8 escaped; ValueError where it is none."""
-    with bounded_growth(_GROWTH):
+    with bounded_growth():
         text = dataset.asstr(errors="surrogateescape")[()]
     if not isinstance(text, str):
         raise ValueError(f"{dataset.name}: no text")
@@ -56,11 +54,11 @@ def dataset_text(dataset: h5py.Dataset) -> str:
 
 def dataset_texts(dataset: h5py.Dataset) -> AnyArray:
     """Texts, str objects in the dataset's shape; raises what h5py raises where it holds others."""
-    with bounded_growth(_GROWTH):
+    with bounded_growth():
         return dataset.asstr()[()]  # type: ignore[no-any-return]
 
 
 def read_attribute(owner: h5py.Group | h5py.Dataset, key: str) -> Any:
     """An attribute as h5py gives it; KeyError where there is none."""
-    with bounded_growth(_GROWTH):
+    with bounded_growth():
         return owner.attrs[key]

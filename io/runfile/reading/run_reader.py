@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+_BLOCK = 64
+"""Packed frames that are read together."""
 _SCALES = 8 * limits.FRAMES
 """Bytes of one scale of the volume."""
 _FRAMES = 48
@@ -294,12 +296,12 @@ class Run:
         """
         return self.cell_reliability.of_cells(self.read_frame(frame)[0])
 
-    def read_packed_frames(self, field: layout.Field, number: int) -> Iterator[PackedFrames]:
-        """The log-odds or labels of all frames, `number` at a time, as they are packed."""
+    def read_packed_frames(self, field: layout.Field) -> Iterator[PackedFrames]:
+        """The log-odds or labels of all frames, some at a time, as they are packed."""
         with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:
             dataset = file[layout.OCCUPANCY][field.name]
-            for start in range(0, len(self.frames), number):
-                frames = self.frames[start : start + number]
+            for start in range(0, len(self.frames), _BLOCK):
+                frames = self.frames[start : start + _BLOCK]
                 chunks = (dataset.id.read_direct_chunk((start + k, 0, 0, 0)) for k in range(len(frames)))
                 yield PackedFrames(frames, [PackedFrame(*chunk) for chunk in chunks])
 
@@ -339,7 +341,7 @@ def _names(group: h5py.Group) -> dict[int, str]:
 def _checked_run(path: Path, file: h5py.File) -> Run:
     checks = LayoutChecks(path, file)
     for name in ("format", "format_version"):
-        checks.require_value("/", name, layout.ROOT_ATTRIBUTES[name])
+        checks.require_value(name, layout.ROOT_ATTRIBUTES[name])
     cameras = checks.names("/", "cameras")
     lengths: dict[str, int] = {}
     for field in layout.FIELDS:

@@ -25,7 +25,6 @@ from stseg.trackers import find_tracker
 from stseg.tracking.segment_stitching import SegmentTracks, Stitcher, renamed_labels
 from stseg.trajectories.final_tracks import FinalTracks, box_parts
 
-_BLOCK = 64
 """Frames of the volume read at a time."""
 _COPIED = ("ghosts", "windows", "rates", "shifts", "timings", "appearance")
 """Tables of the segments that the run file takes unchanged."""
@@ -161,7 +160,7 @@ def _append_segments(job: Job, segments: Sequence[_StitchedSegment], identity: I
 
 def _copy(run: Run, writer: RunWriter) -> None:
     """Append what the run file takes unchanged of a segment."""
-    for frames, log_odds in run.read_packed_frames(layout.LOG_ODDS, _BLOCK):
+    for frames, log_odds in run.read_packed_frames(layout.LOG_ODDS):
         writer.append_packed_log_odds(frames, log_odds)
     for table in _COPIED:
         writer.append(table, np.asarray(getattr(run, table)))
@@ -180,5 +179,5 @@ def _append_labels(run: Run, frame: Ints, names: Ints, identity: Ints, writer: R
             return label
         return packed_frame(renamed_labels(unpacked_label(label, run.views.shape), names[here], identity[here]))
 
-    for frames, label in run.read_packed_frames(layout.LABEL, _BLOCK):
+    for frames, label in run.read_packed_frames(layout.LABEL):
         writer.append_packed_labels(list(packers.map(renamed, frames.tolist(), label)))

@@ -81,8 +81,8 @@ class DwellPlace:
     share: float
 
 
-def dwell_places(trajectory: Rows, bins: Bins, most: int = 3) -> list[DwellPlace]:
-    """Places with more person-time within `_DWELL_RADIUS` than an even spread would give, the longest first.
+def dwell_places(trajectory: Rows, bins: Bins) -> list[DwellPlace]:
+    """Up to three places with more person-time within `_DWELL_RADIUS` than an even spread gives, the longest first.
 
     Greedy: the place with most time, then the next in the remaining time.
     """
@@ -90,7 +90,7 @@ def dwell_places(trajectory: Rows, bins: Bins, most: int = 3) -> list[DwellPlace
     even = np.pi * _DWELL_RADIUS**2 / ((bins.x[1] - bins.x[0]) * (bins.y[1] - bins.y[0]))
     found: list[DwellPlace] = []
     total = max(len(remaining), 1)
-    while len(remaining) and len(found) < most:
+    while len(remaining) and len(found) < 3:
         place = _busiest(remaining, bins)
         inside = np.hypot(*(remaining - place).T) <= _DWELL_RADIUS
         share = float(inside.sum() / total)

@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats
 from stseg.geometry import Grid
 from stseg.reporting.pictures.canvas import blank, outline, stroke, text, text_size
-from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Colour
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE
 
 _LEFT_MARGIN, _RIGHT_MARGIN, _TOP_MARGIN, _BOTTOM_MARGIN = 76, 44, 104, 132  # for title, labels and legend, pixels
 LEGEND_WIDTH = 900
@@ -92,15 +92,15 @@ def rule(canvas: Bytes, plan: PlanMap) -> None:
     text(canvas, "x and y, metres", (right, bottom + 42), QUIET, 15, (1, 0))
 
 
-def scale_bar(canvas: Bytes, plan: PlanMap, place: tuple[float, float], colour: Colour = INK) -> None:
+def scale_bar(canvas: Bytes, plan: PlanMap, place: tuple[float, float]) -> None:
     """A bar of a round number of metres with its right end at `place`."""
     metres = max((step for step in _ROUND_DISTANCES if step * plan.scale <= 180), default=_ROUND_DISTANCES[0])
     (u, v), length = place, metres * plan.scale
     words = f"{metres:g} m"
-    stroke(canvas, np.array([[u - length, v], [u, v]]), colour, 3)
+    stroke(canvas, np.array([[u - length, v], [u, v]]), INK, 3)
     for end in (u - length, u):
-        stroke(canvas, np.array([[end, v - 6], [end, v + 6]]), colour, 2)
-    text(canvas, words, (u - length - 12 - text_size(words, 16)[0], v), colour, 16, (0, 0.5))
+        stroke(canvas, np.array([[end, v - 6], [end, v + 6]]), INK, 2)
+    text(canvas, words, (u - length - 12 - text_size(words, 16)[0], v), INK, 16, (0, 0.5))
 
 
 def step_for(scale: float, pixels: float, least: float) -> float:

@@ -21,16 +21,16 @@ _MAX_OUTLINE = 5  # greatest width of an outline, pixels
 
 
 def volume_picture(
-    log_odds: AnyArray, label: Labels, grid: Grid, title: str = "", width: int = 1400, limit: float | None = None
+    log_odds: AnyArray, label: Labels, grid: Grid, title: str = "", limit: float | None = None
 ) -> Picture:
     """All planes of one frame as a contact sheet, the ground first, y up.
 
     `log_odds` float (plane, y, x) are nats, nan where no view sees the cell; the ids of `label` int32 (plane, y, x) are
-    outlined, 0 is background. `width` is about that of the picture, pixels. Colours end at log-odds of `limit`, nats,
+    outlined, 0 is background. Colours end at log-odds of `limit`, nats,
     or at the 99th percentile of their sizes.
     """
     panels = [_Panel(f"{z:.2f} m", log_odds[k], label[k]) for k, z in enumerate(grid.heights)]
-    return _contact_sheet(panels, title, width, colour_limit(log_odds) if limit is None else limit)
+    return _contact_sheet(panels, title, 1400, colour_limit(log_odds) if limit is None else limit)
 
 
 def marginal_picture(
