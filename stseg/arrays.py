@@ -33,6 +33,11 @@ def by_track(table: Rows) -> list[Rows]:
     return np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(table) else []
 
 
+def even_rows(count: int, most: int) -> Ints:
+    """At most `most` row numbers, spread evenly over `count` rows from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, min(most, count)).astype(np.int64))
+
+
 def repeated_rows(table: Rows, names: Sequence[str]) -> Flags:
     """Rows whose values in these columns stand in an earlier row, bool (n,)."""
     keys, repeats = [table[name] for name in names], np.zeros(len(table), bool)

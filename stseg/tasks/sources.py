@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Bytes, Flags, Floats, Ints, Observation
-from stseg.calibration.automatic.endpoints import even_rows
+from stseg.arrays import Bytes, Flags, Floats, Ints, Observation, even_rows
 from stseg.calibration.check.blunders import find_swapped_streams
 from stseg.calibration.check.box_correspondence import isolated_boxes
 from stseg.calibration.check.rig_check import swapped_text

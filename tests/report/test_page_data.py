@@ -12,7 +12,7 @@ import run_files
 from checks import drawn
 from hypothesis import strategies as st
 
-from stseg.arrays import AnyArray, Bytes, Labels, Rows, Singles
+from stseg.arrays import AnyArray, Bytes, Labels, Rows, Singles, even_rows
 from stseg.commands.report import report
 from stseg.geometry import Grid
 from stseg.io.runfile.layout import ghost_type
@@ -20,7 +20,7 @@ from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.records.ghost_reasons import ghost_reasons
 from stseg.records.tables import EVENT, TRAJECTORY, Tracks
 from stseg.reporting.page.answers import answers
-from stseg.reporting.page.embedded import Sheets, coarse, embedded_json, evenly_spaced, thin_sheets, thin_tracks
+from stseg.reporting.page.embedded import Sheets, coarse, embedded_json, thin_sheets, thin_tracks
 from stseg.reporting.pictures.maps import DwellPlace
 from stseg.reporting.run_statistics import Span
 
@@ -69,11 +69,10 @@ def test_sheets_keep_to_their_budget_also_of_large_ground() -> None:
 
 
 @drawn(30, st.integers(1, 60), st.integers(2, 20))
-def test_spread_frames_reach_from_end_to_end(count: int, most: int) -> None:
-    frames = np.arange(10, 10 + count)
-    chosen = evenly_spaced(frames, most)
+def test_even_rows_reach_from_end_to_end(count: int, most: int) -> None:
+    chosen = even_rows(count, most)
     assert len(chosen) == min(count, most) and len(np.unique(chosen)) == len(chosen)
-    assert chosen[0] == frames[0] and chosen[-1] == frames[-1]
+    assert chosen[0] == 0 and chosen[-1] == count - 1
 
 
 def walks(frames: int, people: int) -> Rows:

@@ -63,11 +63,6 @@ class Endpoints:
         return Endpoints(self.frame[rows], self.foot[rows], self.head[rows])
 
 
-def even_rows(count: int, most: int) -> Ints:
-    """At most `most` row numbers, spread evenly over `count` rows."""
-    return np.unique(np.linspace(0, count - 1, min(most, count)).astype(np.int64))
-
-
 def concatenate_endpoints(parts: list[tuple[int, Floats]]) -> Endpoints:
     """Endpoints of a view from (frame, `upright_endpoints` of it) in order."""
     frame = np.repeat([k for k, _ in parts], [len(endpoints) for _, endpoints in parts]).astype(np.int64)

@@ -11,9 +11,8 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.optimize import approx_fprime
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, even_rows
 from stseg.calibration.adjusted_rig import scaled
-from stseg.calibration.automatic.endpoints import even_rows
 from stseg.calibration.automatic.solution import SolvedViews
 from stseg.calibration.bundle_adjustment import adjust
 from stseg.calibration.pinhole import CENTRE, on_plane

@@ -11,8 +11,8 @@ from operator import itemgetter
 import numpy as np
 from scipy.optimize import least_squares
 
-from stseg.arrays import Flags, Floats
-from stseg.calibration.automatic.endpoints import Endpoints, even_rows
+from stseg.arrays import Flags, Floats, even_rows
+from stseg.calibration.automatic.endpoints import Endpoints
 from stseg.calibration.pinhole import CENTRE, FOCAL, RADIAL, SIZE, TURN, looking, on_plane, project
 
 _SPREAD = 0.05

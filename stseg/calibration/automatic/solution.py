@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, even_rows
 from stseg.calibration.automatic.correspondence import Correspondences, match_endpoints
-from stseg.calibration.automatic.endpoints import Endpoints, even_rows
+from stseg.calibration.automatic.endpoints import Endpoints
 from stseg.calibration.automatic.floor_features import Marks
 from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
 from stseg.calibration.automatic.view_alignment import ViewPlaces

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, even_rows
 from stseg.bodies.pillars import BodyTable
-from stseg.calibration.automatic.endpoints import even_rows
 from stseg.calibration.check.blunders import (
     BoxesByFrame,
     StreamDelay,

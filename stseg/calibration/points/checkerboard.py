@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from stseg.arrays import Bytes, Floats
-from stseg.calibration.automatic.endpoints import even_rows
+from stseg.arrays import Bytes, Floats, even_rows
 from stseg.errors import CalibrationError
 from stseg.geometry import Lens
 

@@ -5,8 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats
-from stseg.calibration.automatic.endpoints import even_rows
+from stseg.arrays import Flags, Floats, even_rows
 from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_requirements import MIN_POINTS, all_but_one_on_line
 from stseg.geometry.fits import homogeneous

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Ints, Labels, Rows, Singles
+from stseg.arrays import AnyArray, Bytes, Ints, Labels, Rows, Singles, even_rows
 from stseg.geometry import Grid, Rig
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
 from stseg.reporting.page.html import script_json
@@ -61,7 +61,7 @@ def thin_sheets(frames: Ints, grid: Grid, read_frame: ReadFrame, budget: int, wa
         Without frames where there are none.
     """
     most = int(np.clip(_MAX_CELLS // np.prod(grid.shape), 3, _MAX_FRAMES))
-    chosen = evenly_spaced(frames, most)
+    chosen = frames[even_rows(len(frames), most)]
     probes = chosen[len(chosen) // 6 :: max(1, len(chosen) // 3)][:3]
     limit = max((colour_limit(read_frame(int(frame))[0]) for frame in probes), default=1.0)
     step = max(1, -(-max(grid.shape[1:]) // _MAX_SIDE))
@@ -71,13 +71,6 @@ def thin_sheets(frames: Ints, grid: Grid, read_frame: ReadFrame, budget: int, wa
         chosen = chosen[::2]
     sheet_frames = np.union1d(chosen, wanted)
     return Sheets(sheet_frames, shape, limit, [pngs[int(frame)] for frame in sheet_frames])
-
-
-def evenly_spaced(frames: Ints, most: int) -> Ints:
-    """At most so many of the frames, evenly spread, the first and the last among them."""
-    if len(frames) <= most:
-        return frames
-    return np.asarray(frames[np.rint(np.linspace(0, len(frames) - 1, most)).astype(int)])
 
 
 def coarse(log_odds: AnyArray, step: int) -> AnyArray:

@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from stseg.arrays import Floats
-from stseg.calibration.automatic.endpoints import even_rows
+from stseg.arrays import Floats, even_rows
 from stseg.engine.recordings import recording_of
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Rig
