@@ -245,16 +245,11 @@ def output_error(path: Path, error: OSError) -> OutputError:
     return OutputError(path, "", error.strerror or error, "a place with room that can be written")
 
 
-def write_page(path: Path, page: str, overwrite: bool) -> None:
-    """Write an HTML page, whole or not at all.
+def write_file(path: Path, data: bytes, overwrite: bool = True) -> None:
+    """Write a file's bytes, whole or not at all.
 
     OutputError where the file exists and is not to be overwritten, or cannot be written.
     """
-    write_file(path, page.encode("utf-8"), overwrite)
-
-
-def write_file(path: Path, data: bytes, overwrite: bool = True) -> None:
-    """Write a file's bytes, whole or not at all; see `write_page`."""
     with replacing(path, overwrite) as part:
         part.write_bytes(data)
 

@@ -15,7 +15,7 @@ from stseg.engine.reporter import AnyReporter, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
 from stseg.io.outputs.video_writer import require_film_name, write_film
-from stseg.io.outputs.whole_files import Inputs, make_folder, require_output, write_page, write_png
+from stseg.io.outputs.whole_files import Inputs, make_folder, require_output, write_file, write_png
 from stseg.io.recording.aligned_stream import decoder_threads
 from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import Recording
@@ -140,7 +140,7 @@ def _write_page(
     unseen = (None,) * len(run.cameras)
     instants = [Instant(frame, *run.read_frame(frame), views.get(frame, unseen)) for frame in frames]
     contents = page_contents(run, true, instants, bool(frame), camera_images)
-    write_page(output, report_page(contents), overwrite)
+    write_file(output, report_page(contents).encode(), overwrite)
     if pictures is None:
         return [output]
     drawn = instants if frame else instants[len(instants) // 2 :][:1]

@@ -14,7 +14,7 @@ from stseg.engine.pipeline import identity_problem
 from stseg.identities.review.doubts import Doubt, find_doubts
 from stseg.identities.review.weighed_doubts import weighed_doubts
 from stseg.io.config_file import parse_config
-from stseg.io.outputs.whole_files import Inputs, require_output, write_page
+from stseg.io.outputs.whole_files import Inputs, require_output, write_file
 from stseg.io.runfile.runs import Run, read_run
 from stseg.records.border import Border
 from stseg.reporting.charts import clock_time
@@ -64,7 +64,7 @@ def write_review(run_file: Path, output: Path, *, most: int, camera_images: bool
     views = read_views(run.recording, frames) if camera_images and doubts else {}
     questions = [_question(run, doubt, views) for doubt in doubts]
     page = review_page(f"{run.scene}: review", run_file.name, run.recording.rig.grid, questions, camera_images)
-    write_page(output, page, overwrite)
+    write_file(output, page.encode(), overwrite)
     return len(questions)
 
 

@@ -13,7 +13,7 @@ from stseg.arrays import Bytes
 from stseg.commands.calibrate.scene import area_of
 from stseg.commands.options import Overwrite
 from stseg.errors import ConfigError, SourceError
-from stseg.io.outputs.whole_files import Inputs, require_output, write_page
+from stseg.io.outputs.whole_files import Inputs, require_output, write_file
 from stseg.io.recording.pictures import read_colour
 from stseg.io.recording.recording import Source
 from stseg.io.recording.source_files import is_image_source
@@ -63,7 +63,8 @@ def calibrate_page(
     frames = [_frames(path, frame) for path in videos]
     command = _next_command(videos, [one[0] for one in frames], area)
     floor = _plan(plan, x1 - x0, y1 - y0)
-    write_page(output, calibration_page(names, frames, (x0, y0, x1, y1), floor, command), overwrite)
+    page = calibration_page(names, frames, (x0, y0, x1, y1), floor, command)
+    write_file(output, page.encode(), overwrite)
     print(f"wrote {output}: {len(frames)} views (it shows camera frames); open it in a browser")
 
 

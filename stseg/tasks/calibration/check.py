@@ -18,7 +18,7 @@ from stseg.engine.recordings import recording_of
 from stseg.engine.reporter import AnyReporter, reporter_of
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry.sampling import Sampling
-from stseg.io.outputs.whole_files import Inputs, require_output, write_page
+from stseg.io.outputs.whole_files import Inputs, require_output, write_file
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.source_files import recording_files
@@ -116,7 +116,7 @@ class RigCheck:
     def write_page(self, output: Path, overwrite: bool = False) -> None:
         """Write verdict and pictures as one HTML page, which holds images of the cameras."""
         require_output(output, overwrite, Inputs(recording_files(self.recording)))
-        write_page(output, _page(self), overwrite)
+        write_file(output, _page(self).encode(), overwrite)
 
     def write_pictures(self, folder: Path, overwrite: bool = False) -> int:
         """Write the pictures as PNG files grid_CAMERA.png and coverage.png; their number."""
