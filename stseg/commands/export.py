@@ -16,6 +16,9 @@ from stseg.io.outputs.whole_files import Inputs, replacing, require_output
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.untrusted.values import abbreviated
 
+_NAMED = "csv", "parquet", "geojson", "mf-json"
+"""Formats of one run that hold names of tracks."""
+
 
 def export(
     run: Path,
@@ -47,12 +50,14 @@ def export(
     output
         The file to write.
     names
-        CSV with the columns id,name: csv, parquet, geojson and mf-json hold the names of tracks too.
+        CSV with the columns id,name, for formats that hold names: csv, parquet, geojson, mf-json and the databases.
     """
     if to not in (*FORMATS, *ARCHIVES):
         raise ConfigError("command line", "--to", repr(to), f"one of {', '.join((*FORMATS, *ARCHIVES))}")
     if more and to not in ARCHIVES:
         raise ConfigError("command line", "RUN", f"{1 + len(more)} run files", f"one, or --to {' or '.join(ARCHIVES)}")
+    if names is not None and to not in (*_NAMED, *ARCHIVES):
+        raise ConfigError("command line", "--names", f"--to {to}", f"one of {', '.join((*_NAMED, *ARCHIVES))}")
     contents, others = read_run(run), [read_run(one) for one in more]
     inputs = Inputs([names], *(one.files for one in (contents, *others)))
     require_output(output, overwrite, inputs, FORMATS[to].table if to in FORMATS else "")
@@ -75,7 +80,7 @@ def _archive(to: str, output: Path, runs: Sequence[Run], overwrite: bool) -> Non
         raise ConfigError("command line", "RUN", f"{max(stems, key=stems.count)} twice", "files of different names")
     with replacing(output, overwrite) as part:
         ARCHIVES[to](part, runs)
-    print(f"wrote {len(runs)} recordings to {output}")
+    print(f"wrote {len(runs)} recording{'s' * (len(runs) != 1)} to {output}")
 
 
 export.__doc__ = (export.__doc__ or "").replace("{formats}", help_text())

@@ -97,8 +97,10 @@ def _run(tokens: list[str]) -> int:
         sys.stdout.flush()
     except MissingArgumentError as error:
         return _fail(_missing(error, tokens))
-    except (StsegError, CycloptsError) as error:
+    except StsegError as error:
         return _fail(str(error))
+    except CycloptsError as error:
+        return _fail(f"command line: {error}")
     except MemoryError:
         return _fail("this needs more memory than there is")
     except KeyboardInterrupt:

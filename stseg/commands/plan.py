@@ -76,10 +76,10 @@ def _text(estimate: Forecast, recording: Recording) -> str:
     parts = ", ".join(
         f"{name} {_span(seconds)}" for name, seconds in (*shares, ("writing the run file", estimate.joining))
     )
-    size = estimate.file_bytes / 2**20
+    size, segments = estimate.file_bytes / 2**20, f"{estimate.segments} segment{'s' * (estimate.segments != 1)}"
     return "\n".join(
         [
-            f"recording   {estimate.frames} frames, {_span(hours * 3600)}, in {estimate.segments} segments",
+            f"recording   {estimate.frames} frames, {_span(hours * 3600)}, in {segments}",
             f"run         {_span(estimate.seconds)} with {estimate.workers} workers",
             f"work        {parts}",
             f"run file    {size:.0f} MiB, {size / hours:.0f} MiB an hour; temporary files need the same space again",

@@ -6,11 +6,12 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from stseg.commands.calibrate.scene import numbers
 from stseg.commands.options import Frames, Overwrite
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
+from stseg.errors import ConfigError
 from stseg.geometry import Grid
+from stseg.io.untrusted.values import abbreviated, parse_numbers
 from stseg.tasks.calibration import automatic
 from stseg.tasks.calibration.automatic import AutomaticCalibration, Distance, camera_names
 
@@ -110,6 +111,9 @@ def _print(found: AutomaticCalibration, person_height: float, distances: Sequenc
 
 def _distance(text: str, names: Sequence[str]) -> Distance:
     camera, _, rest = text.partition(",")
-    expected = f"camera,u,v,u,v,metres with a camera of {', '.join(names)}"
-    u0, v0, u1, v1, metres = numbers("--distance", rest, expected, 5)
+    found = parse_numbers(rest.split(","))
+    if found is None or len(found) != 5:
+        expected = f"camera,u,v,u,v,metres with a camera of {', '.join(names)}"
+        raise ConfigError("--distance", "", abbreviated(text), expected)
+    u0, v0, u1, v1, metres = found
     return camera, u0, v0, u1, v1, metres

@@ -128,9 +128,9 @@ def words(option: str, text: str, count: int) -> list[str]:
     return found
 
 
-def numbers(option: str, text: str, expected: str, count: int | None = None) -> list[float]:
+def numbers(option: str, text: str, expected: str) -> list[float]:
     """Finite numbers between commas."""
     found = parse_numbers(text.split(","))
-    if found is None or (count is not None and len(found) != count):
+    if found is None:
         raise ConfigError(option, "", abbreviated(text), expected)
     return found
