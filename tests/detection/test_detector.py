@@ -102,6 +102,7 @@ def test_pixels_boxes_and_tracks_are_assigned_to_people(kind: str) -> None:
     assert min(first, second) > FEW_HEIGHTS.prior_log_odds > birth + 3
 
 
+@compiled_only
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_frame_without_views_detects_nobody(kind: str) -> None:
     detector, expected = room_detector(kind), expecting((0.4, -0.3))
