@@ -74,6 +74,7 @@ def test_counts_by_definition(seed: int) -> None:
     np.testing.assert_allclose(teach(1, shown, near, inside, trusted, rates, 0.6), expected, rtol=1e-3, atol=1e-6)
 
 
+@compiled_only
 def test_rates_of_some_cells_are_those_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a large ground one block stands for those that follow it."""
     seen, found = frame("pixels", 0), []
