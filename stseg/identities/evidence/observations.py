@@ -34,8 +34,8 @@ class ObservedRows(NamedTuple):
     """float64 (n, size): inverse variance of each size."""
     information: Floats
     """float64 (n, size): the precision times the deviation of the size from the population's mean."""
-    sign: Ints
-    """int64 (n,): a number for each row, drawn at random, of 62 bits."""
+    hash_number: Ints
+    """int64 (n,): a number for each row, drawn at random, of 62 bits (Zobrist hashing)."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,9 @@ class Observations:
         precision, information = one.precision[chosen], one.information[chosen]
         np.add.at(precision, place[stand_in], one.precision[left_out])
         np.add.at(information, place[stand_in], one.information[left_out])
-        certain, inside, sign = one.certain[chosen] & (previous >= 0), one.inside[chosen], _signs(len(chosen))
+        certain, inside, numbers = one.certain[chosen] & (previous >= 0), one.inside[chosen], _hash_numbers(len(chosen))
         places = one.ground[chosen], one.variance[chosen], previous, certain, inside
-        rows = ObservedRows(*places, precision, information, sign)
+        rows = ObservedRows(*places, precision, information, numbers)
         return Observations(self.order[chosen], np.append(start, len(chosen)), self.seconds[frames], rows)
 
 
@@ -98,11 +98,11 @@ def observe(
     alone = np.ones(len(order), bool)
     alone[near_rows(trajectory, EXCHANGE_DISTANCE)[0]] = False
     places = ground, variance, previous, _certain(frame, previous, alone[order]), inside
-    observed = ObservedRows(*places, precision, information, _signs(len(order)))
+    observed = ObservedRows(*places, precision, information, _hash_numbers(len(order)))
     return Observations(order, np.append(start, len(order)), frames / frame_rate, observed)
 
 
-def _signs(number: int) -> Ints:
+def _hash_numbers(number: int) -> Ints:
     return np.random.default_rng(0).integers(1 << 61, size=number) * 2 + 1
 
 

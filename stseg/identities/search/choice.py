@@ -100,7 +100,7 @@ def _fill_present(
         p = hypotheses.past[h, s]
         present.name[h, s] = pasts.name[p] if p >= 0 else -1
         if p >= 0:
-            present.unseen[h, s] = _product(observed.sign[pasts.name[p]], observed.sign[pasts.last[p]])
+            present.unseen[h, s] = _product(observed.hash_number[pasts.name[p]], observed.hash_number[pasts.last[p]])
             key = (key + int(present.unseen[h, s])) & KEY_BITS
     for i in range(column.shape[1]):
         key += _key_term(present, h, observed, first + i, column[h, i])
@@ -126,8 +126,8 @@ def _key_of(
 def _key_term(present: Present, h: int, observed: ObservedRows, r: int, s: int) -> int:
     """Change of the key of a hypothesis where row r is that of a slot, or of a new person (-1)."""
     if s < 0:
-        return _product(observed.sign[r], observed.sign[r])
-    return int(_product(observed.sign[present.name[h, s]], observed.sign[r]) - present.unseen[h, s])
+        return _product(observed.hash_number[r], observed.hash_number[r])
+    return int(_product(observed.hash_number[present.name[h, s]], observed.hash_number[r]) - present.unseen[h, s])
 
 
 @part

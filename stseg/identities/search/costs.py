@@ -58,7 +58,7 @@ def _fill_costs(
     since = now - pasts.seconds[p]
     x = pasts.state[p, 0] + since * pasts.state[p, 2]
     y = pasts.state[p, 1] + since * pasts.state[p, 3]
-    spreads = predicted_variance(pasts.covariance, p, since, rules.turn)
+    spreads = predicted_variance(pasts.covariance, p, since, rules.process_noise)
     for i in range(len(alone)):
         r = first + i
         if observed.certain[r] and observed.previous[r] != pasts.last[p]:

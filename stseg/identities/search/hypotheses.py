@@ -160,10 +160,10 @@ def size_evidence(precision: float, information: float, spread: float) -> float:
 
 
 @part
-def predicted_variance(covariance: Floats, p: int, seconds: float, turn: float) -> float:
-    """Variance of a predicted coordinate, square metres; `turn` is the variance of velocity gained in a second."""
+def predicted_variance(covariance: Floats, p: int, seconds: float, noise: float) -> float:
+    """Variance of a predicted coordinate, square metres; `noise` is the process noise of `Rules`."""
     still = covariance[p, 0] + 2.0 * seconds * covariance[p, 1] + seconds * seconds * covariance[p, 2]
-    return float(still + turn * seconds * seconds * seconds / 3.0)
+    return float(still + noise * seconds * seconds * seconds / 3.0)
 
 
 @part
@@ -173,7 +173,8 @@ def begin_past(pasts: Pasts, p: int, r: int, now: float, observed: ObservedRows,
     pasts.seconds[p] = now
     pasts.state[p, 0], pasts.state[p, 1] = observed.ground[r, 0], observed.ground[r, 1]
     pasts.state[p, 2] = pasts.state[p, 3] = 0.0
-    pasts.covariance[p, 0], pasts.covariance[p, 1], pasts.covariance[p, 2] = observed.variance[r], 0.0, rules.pace
+    pasts.covariance[p, 0], pasts.covariance[p, 1] = observed.variance[r], 0.0
+    pasts.covariance[p, 2] = rules.velocity_variance
     for d in range(pasts.precision.shape[1]):
         pasts.precision[p, d], pasts.information[p, d] = observed.precision[r, d], observed.information[r, d]
         pasts.evidence[p, d] = size_evidence(observed.precision[r, d], observed.information[r, d], rules.spread[d])
@@ -196,7 +197,7 @@ def keep_past(pasts: Pasts, p: int, others: Pasts, q: int) -> None:
 def continue_past(pasts: Pasts, q: int, r: int, now: float, observed: ObservedRows, rules: Rules) -> None:
     """Continue the q-th past by observation r."""
     since = now - pasts.seconds[q]
-    correct_place(pasts.state, pasts.covariance, q, since, observed.ground, observed.variance, r, rules.turn)
+    correct_place(pasts.state, pasts.covariance, q, since, observed.ground, observed.variance, r, rules.process_noise)
     pasts.last[q], pasts.seconds[q] = r, now
     for d in range(pasts.precision.shape[1]):
         if observed.precision[r, d] != 0.0:
@@ -207,12 +208,12 @@ def continue_past(pasts: Pasts, q: int, r: int, now: float, observed: ObservedRo
 
 @part
 def correct_place(
-    state: Floats, covariance: Floats, p: int, since: float, ground: Floats, variance: Floats, r: int, turn: float
+    state: Floats, covariance: Floats, p: int, since: float, ground: Floats, variance: Floats, r: int, noise: float
 ) -> None:
     """Predict the p-th filter and correct it by the r-th place (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2)."""
-    place = predicted_variance(covariance, p, since, turn)
-    both = covariance[p, 1] + since * covariance[p, 2] + turn * since * since / 2.0
-    pace = covariance[p, 2] + turn * since
+    place = predicted_variance(covariance, p, since, noise)
+    both = covariance[p, 1] + since * covariance[p, 2] + noise * since * since / 2.0
+    velocity_variance = covariance[p, 2] + noise * since
     total = place + variance[r]
     for axis in range(2):
         off = ground[r, axis] - state[p, axis] - since * state[p, axis + 2]
@@ -220,7 +221,7 @@ def correct_place(
         state[p, axis + 2] += both / total * off
     covariance[p, 0] = place - place * place / total
     covariance[p, 1] = both - both * place / total
-    covariance[p, 2] = pace - both * both / total
+    covariance[p, 2] = velocity_variance - both * both / total
 
 
 class Rules(NamedTuple):
@@ -236,9 +237,9 @@ class Rules(NamedTuple):
     """Greatest loss of an alternative in one frame, nats."""
     beam_loss: float
     """Greatest loss of a hypothesis against the best, nats."""
-    turn: float
+    process_noise: float
     """Variance of the velocity gained in a second."""
-    pace: float
+    velocity_variance: float
     """Variance of the velocity of a new person."""
     spread: Floats
     """float64 (size,): variance of each size among people."""
