@@ -35,7 +35,8 @@ def rejected_candidates(estimate: MapEstimate) -> People:
         births,
         sizes,
     )
-    return candidates.at(np.flatnonzero(additions.view_evidence.any(0)))
+    is_shown = additions.view_evidence.any(0)
+    return candidates if is_shown.all() else candidates.at(np.flatnonzero(is_shown))
 
 
 def candidate_prior_log_odds(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:
