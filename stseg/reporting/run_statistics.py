@@ -12,6 +12,8 @@ DOUBT_LIMIT = 0.9
 """Probability below which a point is doubtful."""
 _LONG_RUN = 600.0
 """Length of a run from which its busiest minutes are shown separately, seconds."""
+_BUSIEST = 3
+"""Minutes that are shown so."""
 _EXCHANGE_RATE, _RATE_NEAR_ENDS, _RATE_OF_ABSENCE = 0.058, 0.044, 0.15
 """Exchanges of a track, by each track that begins or ends near it, and by each second in which it has no row."""
 _END_DISTANCE, _BORDER_WIDTH = 1.5, 0.5
@@ -145,11 +147,11 @@ def people_by_hour(span: Span, trajectory: Rows) -> list[BusyTime]:
 
 
 def busiest_minutes(span: Span, trajectory: Rows) -> list[BusyTime]:
-    """The three minutes of a long run with most people, the earlier first where they are equal; in order of time."""
+    """Minutes of a long run with most people, the earlier first where they are equal; in order of time."""
     if (span.stop - span.first) / span.frame_rate < _LONG_RUN:
         return []
     minutes = _parts(span, trajectory, _MINUTE)
-    busiest = sorted(minutes, key=lambda one: (-one.mean, one.first))[:3]
+    busiest = sorted(minutes, key=lambda one: (-one.mean, one.first))[:_BUSIEST]
     return sorted((one for one in busiest if one.mean > 0), key=lambda one: one.first)
 
 

@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import IO, BinaryIO
+from typing import IO, BinaryIO, TypeVar
 
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import create_part, output_error, parts_of, publish_part
 
 _Handler = Callable[[int, FrameType | None], object]
+F = TypeVar("F", bound=IO[bytes] | io.FileIO)
 
 
 class PartFile(io.RawIOBase):
@@ -139,13 +140,7 @@ class PartFile(io.RawIOBase):
         _remove_abandoned(self._path)
         self.part, descriptor = create_part(self._path)
         """The temporary file."""
-        file = os.fdopen(descriptor, "r+b", buffering=0)
-        try:
-            lock(file)
-        except OSError:
-            file.close()
-            raise
-        return file
+        return _locked(os.fdopen(descriptor, "r+b", buffering=0))
 
     def _raise_failure(self) -> None:
         if self._failure is not None:
@@ -201,7 +196,12 @@ else:
 
 def locked_file(path: Path) -> BinaryIO:
     """A file of ours, made where there is none, which `lock` holds; links are not followed."""
-    file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666), "r+b")
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+    return _locked(os.fdopen(os.open(path, flags, 0o666), "r+b"))
+
+
+def _locked(file: F) -> F:
+    """The file, which `lock` holds; it is closed where another process holds it."""
     try:
         lock(file)
     except OSError:

@@ -25,7 +25,6 @@ from stseg.trackers import find_tracker
 from stseg.tracking.segment_stitching import SegmentTracks, Stitcher, renamed_labels
 from stseg.trajectories.final_tracks import FinalTracks, box_parts
 
-"""Frames of the volume read at a time."""
 _COPIED = ("ghosts", "windows", "rates", "shifts", "timings", "appearance")
 """Tables of the segments that the run file takes unchanged."""
 

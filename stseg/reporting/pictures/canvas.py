@@ -15,6 +15,7 @@ from stseg.reporting.pictures.colours import PAPER, Colour
 MAX_LABELS = 24
 """Tracks that are labelled in a picture: the longest ones."""
 _SHIFT = 4  # fractional bits of OpenCV's coordinates
+_TRAIL_WIDTH = 3  # of a fading stroke, pixels
 _CAPITALS = 22.0  # height in pixels of OpenCV's capitals at scale 1
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
@@ -42,15 +43,15 @@ def dashes(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, on: 
 
 
 def fading_stroke(canvas: Bytes, points: AnyArray, colour: Colour, opacities: AnyArray) -> None:
-    """An open polyline, three pixels wide, with an opacity for each piece, 0..1, one fewer than points."""
+    """An open polyline, `_TRAIL_WIDTH` wide, with an opacity for each piece, 0..1, one fewer than points."""
     points = np.asarray(points, float)
     finite: Flags = np.asarray(np.isfinite(points).all(axis=1))
     if not finite.any():
         return
-    for mask, origin in _blended(canvas, points[finite], 4, colour, 1.0):
+    for mask, origin in _blended(canvas, points[finite], _TRAIL_WIDTH + 1, colour, 1.0):
         for k in np.flatnonzero(finite[1:] & finite[:-1]):
             piece = _fixed(points[k : k + 2] - origin)
-            cv2.polylines(mask, [piece], False, round(255 * float(opacities[k])), 3, cv2.LINE_AA, _SHIFT)
+            cv2.polylines(mask, [piece], False, round(255 * float(opacities[k])), _TRAIL_WIDTH, cv2.LINE_AA, _SHIFT)
 
 
 def outline(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1) -> None:

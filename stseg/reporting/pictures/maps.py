@@ -17,6 +17,7 @@ from stseg.reporting.pictures.plan_map import PlanMap, scale_bar, sheet
 _MAX_BINS = 40  # along the longer side of the ground, at most
 _BIN_SIDES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
 _DWELL_RADIUS = 0.75  # radius of a dwell place, metres
+_MOST_PLACES = 3
 _WARM_TONES = np.array([(252, 251, 250), (150, 206, 254), (60, 140, 240), (38, 54, 190), (48, 18, 96)], float)
 
 
@@ -82,7 +83,7 @@ class DwellPlace:
 
 
 def dwell_places(trajectory: Rows, bins: Bins) -> list[DwellPlace]:
-    """Up to three places with more person-time within `_DWELL_RADIUS` than an even spread gives, the longest first.
+    """Places with more person-time within `_DWELL_RADIUS` than an even spread gives, the longest first, a few at most.
 
     Greedy: the place with most time, then the next in the remaining time.
     """
@@ -90,7 +91,7 @@ def dwell_places(trajectory: Rows, bins: Bins) -> list[DwellPlace]:
     even = np.pi * _DWELL_RADIUS**2 / ((bins.x[1] - bins.x[0]) * (bins.y[1] - bins.y[0]))
     found: list[DwellPlace] = []
     total = max(len(remaining), 1)
-    while len(remaining) and len(found) < 3:
+    while len(remaining) and len(found) < _MOST_PLACES:
         place = _busiest(remaining, bins)
         inside = np.hypot(*(remaining - place).T) <= _DWELL_RADIUS
         share = float(inside.sum() / total)

@@ -17,6 +17,7 @@ _TONES = np.array([(176, 128, 84), (230, 204, 176), (249, 249, 249), (110, 184, 
 _UNSEEN = np.array([(236, 234, 232), (205, 201, 198)], np.uint8)  # hatching, light and dark
 _GAP, _HEAD, _MARGIN, _FOOT = 22, 30, 26, 64  # pixels
 _SHEET_SHAPE = 1.6  # width over height
+_SHEET_WIDTH = 1400  # of a contact sheet, about, pixels
 _MAX_OUTLINE = 5  # greatest width of an outline, pixels
 
 
@@ -26,11 +27,10 @@ def volume_picture(
     """All planes of one frame as a contact sheet, the ground first, y up.
 
     `log_odds` float (plane, y, x) are nats, nan where no view sees the cell; the ids of `label` int32 (plane, y, x) are
-    outlined, 0 is background. Colours end at log-odds of `limit`, nats,
-    or at the 99th percentile of their sizes.
+    outlined, 0 is background. Colours end at log-odds of `limit`, nats, or at the 99th percentile of their sizes.
     """
     panels = [_Panel(f"{z:.2f} m", log_odds[k], label[k]) for k, z in enumerate(grid.heights)]
-    return _contact_sheet(panels, title, 1400, colour_limit(log_odds) if limit is None else limit)
+    return _contact_sheet(panels, title, _SHEET_WIDTH, colour_limit(log_odds) if limit is None else limit)
 
 
 def marginal_picture(

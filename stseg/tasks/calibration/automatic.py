@@ -212,6 +212,7 @@ def uncalibrated_camera(name: str, video: Path) -> Camera:
 
 
 def _uncalibrated_cameras(videos: Sequence[Path]) -> tuple[Camera, ...]:
+    """A placeholder for each camera; ConfigError where their names do not tell two or more apart."""
     names = camera_names(videos)
     if len(videos) < 2 or len(set(names)) < len(names):
         found = ", ".join(map(str, videos)) or "none"
