@@ -6,6 +6,7 @@ perturbed runs share are not scored.
 """
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from result_sets import ResultSet
 from workbench import Bench
 
-from stseg.arrays import Boxes, Observation, ViewEvidence
+from stseg.arrays import Boxes, Observation, Rows, ViewEvidence
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.pipeline import Pipeline
@@ -25,6 +26,7 @@ from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
 from stseg.io.detections.source_detections import appearance_axes
 from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 from stseg.trajectories.final_tracks import CommittedRows
@@ -81,15 +83,16 @@ class Tracked(NamedTuple):
     rows: CommittedRows
 
 
-def tracked(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: str = "cut") -> Tracked:
-    """Track a perturbed recording of a set whose inputs are made."""
+def tracked(one: ResultSet, bench: Bench, config: Config, seed: int, cameras: Sequence[int] | None = None) -> Tracked:
+    """Track a perturbed recording of a set whose inputs are made, by all cameras or by some."""
     recording = read_recording(bench.path(one.rig))
     streams = np.random.SeedSequence(seed).spawn(1 + len(recording.sources))
     recording = replace(recording, rig=perturbed_rig(recording.rig, np.random.default_rng(streams[0])))
+    recording = recording if cameras is None else _seen_by(recording, cameras)
     first, stop = map(int, one.frames.split(":"))
     kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
-    pipeline = Pipeline(recording.rig, kinds, config, tracker, appearance_axes(recording))
-    pairs = zip(make_foregrounds(recording, config, first, stop), streams[1:], strict=True)
+    pipeline = Pipeline(recording.rig, kinds, config, "cut", appearance_axes(recording))
+    pairs = zip(make_foregrounds(recording, config, first, stop), streams[1:], strict=False)
     foregrounds = [Perturbed(whole, np.random.default_rng(stream)) for whole, stream in pairs]
     frames_done: list[int] = []
     with open_frames(recording, first, stop) as frames:
@@ -98,10 +101,20 @@ def tracked(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: st
     return Tracked(pipeline, CommittedRows(trajectory, events, np.concatenate([step.appearance for step in steps])))
 
 
-def scored(one: ResultSet, bench: Bench, run: Tracked) -> Scores:
+def _seen_by(recording: Recording, cameras: Sequence[int]) -> Recording:
+    """The recording by some cameras."""
+    rig = replace(recording.rig, cameras=tuple(recording.rig.cameras[k] for k in cameras))
+    return replace(recording, rig=rig, sources=tuple(recording.sources[k] for k in cameras))
+
+
+def final_rows(run: Tracked) -> Rows:
+    """TRAJECTORY of the final tracks of a run."""
+    return run.pipeline.finished(run.rows)[0].trajectory
+
+
+def scored(one: ResultSet, bench: Bench, rows: Rows) -> Scores:
     """Scores of the final tracks of a perturbed run."""
     assert one.truth is not None
-    rows = run.pipeline.finished(run.rows)[0].trajectory
     area = scored_area(one, read_recording(bench.path(one.rig)).rig)
     frames = np.arange(*map(int, one.frames.split(":")))
     flagged = "--ignore-flagged" in shlex.split(one.scoring)

@@ -15,7 +15,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from measure import Tracked, prepare, scored, tracked
+from measure import Tracked, final_rows, prepare, scored, tracked
 from result_sets import SETS, ResultSet
 from workbench import Bench, command_line, commit, write_table
 
@@ -85,7 +85,7 @@ CUTS = {
 
 
 def _scores(one: ResultSet, bench: Bench, whole: Tracked) -> list[float]:
-    found = scored(one, bench, whole)
+    found = scored(one, bench, final_rows(whole))
     return [found.moda or 0.0, found.idf1, found.switches]
 
 

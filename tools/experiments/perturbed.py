@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 import numpy as np
-from measure import prepare, scored, tracked
+from measure import final_rows, prepare, scored, tracked
 from result_sets import SETS
 from workbench import Bench, command_line, commit, write_table
 
@@ -22,7 +22,7 @@ SCORES = ("moda", "idf1", "mota", "switches")
 def run(name: str, bench: Bench, settings: Sequence[str], seed: int) -> list[float]:
     """SCORES of one perturbed run."""
     one = SETS[name]
-    scores = scored(one, bench, tracked(one, bench, read_config(None, list(settings)), seed))
+    scores = scored(one, bench, final_rows(tracked(one, bench, read_config(None, list(settings)), seed)))
     return [float(getattr(scores, score) or 0.0) for score in SCORES]
 
 
