@@ -17,7 +17,7 @@ from stseg.records.people import SAME_PLACE
 _GROUP_DISTANCE = 1.0
 """Distance below which differences depend on each other, metres."""
 _LEAST_GAIN = 2.0
-"""Least gain of an alternative that is worth following, nats."""
+"""Least gain of an alternative that is worth following, and of each exchange beside its others, nats."""
 
 
 def likelihood_gain(untracked: FrameEvidence, people: Candidates, alternative: Candidates) -> float | None:
@@ -29,19 +29,26 @@ def likelihood_gain(untracked: FrameEvidence, people: Candidates, alternative: C
 def best_alternative(
     untracked: FrameEvidence, people: Candidates, alternative: Candidates
 ) -> tuple[Candidates, float] | None:
-    """People with the exchange for which their frame has the most evidence, and its gain, nats; None for too little.
+    """People with the exchanges for which their frame has evidence, and the gain, nats; None for too little.
 
-    Differences of the alternative that are far from each other are exchanges of their own.
+    Differences of the alternative near each other are one exchange. Exchanges far from each other may need each other:
+    with two views a ghost stands where the lines of sight of two people cross. So all are taken together, and each that
+    adds too little to the others is left out again.
     """
     estimate, differing = _both(untracked, people, alternative)
     ground = estimate.pool.ground[differing]
     number, group = connected_components(distances(ground, ground) < _GROUP_DISTANCE, directed=False)
     exchanges = [differing[group == k] for k in range(number)]
-    gains = [_gain(estimate, exchanged) for exchanged in exchanges]
-    if max(gains, default=0.0) <= _LEAST_GAIN:
-        return None
-    best = int(np.argmax(gains))
-    return estimate.pool.at(np.setxor1d(estimate.members, exchanges[best])), gains[best]
+    gain = _gain(estimate, differing)
+    while gain > _LEAST_GAIN:
+        fewer = [np.concatenate([differing[:0], *exchanges[:k], *exchanges[k + 1 :]]) for k in range(len(exchanges))]
+        gains = [_gain(estimate, exchanged) for exchanged in fewer]
+        weakest = int(np.argmax(gains))
+        if gains[weakest] <= gain - _LEAST_GAIN:
+            return estimate.pool.at(np.setxor1d(estimate.members, np.concatenate(exchanges))), gain
+        gain = gains[weakest]
+        del exchanges[weakest]
+    return None
 
 
 def _both(untracked: FrameEvidence, people: Candidates, alternative: Candidates) -> tuple[MapEstimate, Ints]:

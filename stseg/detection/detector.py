@@ -35,7 +35,7 @@ from stseg.noise.rim_estimate import RimEstimate
 from stseg.noise.torn_masks import is_unexplained, mask_log_likelihood
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
-from stseg.records.people import Explanation
+from stseg.records.people import Alternative, Explanation
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.view_health.reprojection_residuals import nearest_people, reprojection_residuals
 from stseg.view_health.view_failures import ViewFailures
@@ -134,7 +134,7 @@ class Detector:
         `predicted` are the tracks of earlier frames; None in a first frame, where births cost nothing. `proposals` are
         candidates from elsewhere, best first: added to those of the first round's lattice, but for duplicates. A frame
         in which a view begins to fail is explained again without it. `alternative` are tracks of another reading of the
-        frames before, by which the frame is explained, too; without them a key frame's search may find one.
+        frames before, by which the frame is explained, too. A key frame's search may find a further reading.
         """
         observations, failures = self.observe(views, learned.box_noise.noise), learned.failures
         failures.begin(predicted, self.views, observations)
@@ -148,7 +148,7 @@ class Detector:
             explanation, is_searched = self._explained(learned, is_key, included, predicted, proposals)
         if alternative is not None:
             other, _ = self._explained(learned, False, included, alternative, None)
-            explanation = self._with_alternative(explanation, other, learned, included)
+            explanation = self._with_followed(explanation, other, learned, included)
         if self._has_boxes:
             learned.box_noise.learn(explanation, self.views, included)
             learned.box_bias.learn(explanation, self.views, included)
@@ -184,16 +184,16 @@ class Detector:
             untracked = self._evidence(evidence.observations, evidence.prior.body, None)
             people = self._search.without_tracks(untracked, estimate)
             estimate = better_of(estimate, self._search.repeated(estimate, people))
-            return _with_best_alternative(estimate, untracked, people), True
+            return _with_found(estimate, untracked, people), True
         return explained_frame(estimate), True
 
-    def _with_alternative(
+    def _with_followed(
         self, explanation: Explanation, other: Explanation, learned: Estimates, observations: ViewObservations
     ) -> Explanation:
-        """A frame's explanation with one by other tracks, and what its evidence says of both."""
+        """A frame's explanation with one by alternative tracks, and what its evidence says of both."""
         untracked = self._evidence(learned.rims.applied(observations), learned.population.body, None)
         gain = likelihood_gain(untracked, explanation.people.candidates, other.people.candidates)
-        return replace(explanation, alternative=other, alternative_gain=gain)
+        return replace(explanation, followed=Alternative(other, gain))
 
     def _evidence(
         self, observations: ViewObservations, body: BodyConfig, predicted: PredictedTracks | None
@@ -233,11 +233,11 @@ class Detector:
         return replace(explanation, residual=np.where(excluded, residual, explanation.residual))
 
 
-def _with_best_alternative(estimate: MapEstimate, untracked: FrameEvidence, people: Candidates) -> Explanation:
-    """The explanation by an estimate, and that by the people of a search without tracks where they differ most."""
+def _with_found(estimate: MapEstimate, untracked: FrameEvidence, people: Candidates) -> Explanation:
+    """The explanation by an estimate, and that by people of a search without tracks where the frame prefers them."""
     explanation = explained_frame(estimate)
     found = best_alternative(untracked, explanation.people.candidates, people)
     if found is None:
         return explanation
     other = explained_frame(MapEstimate.of_members(estimate.evidence, found[0]))
-    return replace(explanation, alternative=other, alternative_gain=found[1])
+    return replace(explanation, found=Alternative(other, found[1]))

@@ -73,6 +73,16 @@ _BY_PERSON = "ground", "height", "width", "covariance", "evidence", "prior", "tr
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """Another reading of a frame."""
+
+    explanation: Explanation
+    """The frame's explanation by other people."""
+    gain: float | None
+    """Gain of the score without tracks by them, nats; None where they are the same."""
+
+
+@dataclass(frozen=True)
 class Explanation:
     """Result of per-frame detection."""
 
@@ -93,7 +103,7 @@ class Explanation:
     nothing was measured."""
     unfinished: int = 0
     """Candidates of the largest group that was not searched to the end, 0 for none."""
-    alternative: Explanation | None = None
-    """The explanation by other people: those of the alternative tracks, or those of a search without tracks."""
-    alternative_gain: float | None = None
-    """Gain of the score without tracks by the alternative, nats; None where its people are the same."""
+    followed: Alternative | None = None
+    """The reading by alternative tracks; None where none are followed."""
+    found: Alternative | None = None
+    """The reading by a search without tracks; None where it has no other people who gain enough."""

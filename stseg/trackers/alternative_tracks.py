@@ -3,14 +3,15 @@
 With few views two sets of people often explain a frame nearly as well, and the tracks keep to the one that they
 predict, though each frame is a little in favour of the other. So the other one is followed, too, with tracks of its
 own. The log-likelihood ratio of both by the frames without tracks is added up, as in Wald's sequential test (1945).
-Once it is large enough, the alternative replaces the tracks from the frame on at which it began.
+Once it is large enough, the alternative replaces the tracks from the frame on at which it began. One is followed at a
+time: a reading for which a single frame has more evidence than all frames for the followed one takes its place.
 """
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
 from stseg.arrays import Ints
-from stseg.records.people import Explanation
+from stseg.records.people import Alternative, Explanation
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.tracking.filter.track_filter import TrackFilter
 
@@ -63,23 +64,29 @@ class AlternativeTracks:
         return self._filter.predict(frame)
 
     def add(self, frame: int, explanation: Explanation, tracks: TrackFilter) -> AcceptedAlternative | None:
-        """Add a frame's explanation with its alternative; the alternative that is accepted from this frame on, if any.
+        """Add a frame's explanation with its alternatives; the one that is accepted from this frame on, if any.
 
         `tracks` are the current ones, from which an alternative begins.
         """
-        other, gain = explanation.alternative, explanation.alternative_gain
-        if other is None:
-            self._filter = None
-            return None
-        if self._filter is None:
+        if explanation.followed is not None:
+            self._add(frame, explanation.followed)
+        found = explanation.found
+        if found is not None and self._weight * (found.gain or 0.0) > self._gain:
             self._filter, self._readings, self._begin, self._gain = tracks.branch(), {}, frame, 0.0
-        self._last = frame, other
-        if gain is not None:
-            self._differed, self._gain = frame, self._gain + self._weight * gain
+            self._add(frame, found)
+        if self._filter is None or self._last is None:
+            return None
+        decision = None
         if self._gain > _ACCEPTED:
-            decision, self._filter = AcceptedAlternative(self._filter, self._readings, other), None
-            return decision
+            decision = AcceptedAlternative(self._filter, self._readings, self._last[1])
         is_over = frame - self._begin > _LONGEST * self._frame_rate
-        if is_over or self._gain < _REJECTED or frame - self._differed >= _SAME_SECONDS * self._frame_rate:
-            self._filter = None
-        return None
+        is_same = frame - self._differed >= _SAME_SECONDS * self._frame_rate
+        if decision is not None or is_over or is_same or self._gain < _REJECTED:
+            self._filter, self._gain = None, 0.0
+        return decision
+
+    def _add(self, frame: int, alternative: Alternative) -> None:
+        """Add the reading of a frame to those of the alternative that is followed, and its gain."""
+        self._last = frame, alternative.explanation
+        if alternative.gain is not None:
+            self._differed, self._gain = frame, self._gain + self._weight * alternative.gain
