@@ -8,16 +8,40 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from stseg.arrays import Ints
+from stseg.detection.explanation import explained_frame
 from stseg.detection.frame_evidence import FrameEvidence
+from stseg.detection.search.frame_search import FrameSearch
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.geometry.distances import distances, unmatched
 from stseg.records.candidates import Candidates
-from stseg.records.people import SAME_PLACE
+from stseg.records.people import SAME_PLACE, Alternative, Explanation
 
 _GROUP_DISTANCE = 1.0
 """Distance below which differences depend on each other, metres."""
 _LEAST_GAIN = 2.0
 """Least gain of an alternative that is worth following, and of each exchange beside its others, nats."""
+
+
+def followed_alternative(
+    search: FrameSearch, followed: FrameEvidence, untracked: FrameEvidence, explanation: Explanation
+) -> Alternative:
+    """The reading of a frame by alternative tracks, those of the evidence `followed`, beside its explanation."""
+    other = explained_frame(search.whole(search.of_tracks(followed)))
+    gain = likelihood_gain(untracked, explanation.people.candidates, other.people.candidates)
+    return Alternative(other, gain)
+
+
+def found_alternative(
+    estimate: MapEstimate, untracked: FrameEvidence, explanation: Explanation, people: Candidates
+) -> Alternative | None:
+    """The reading of a frame by people of a search without tracks; None where the frame does not prefer them.
+
+    The explanation is that of the estimate.
+    """
+    best = best_alternative(untracked, explanation.people.candidates, people)
+    if best is None:
+        return None
+    return Alternative(explained_frame(MapEstimate.of_members(estimate.evidence, best[0])), best[1])
 
 
 def likelihood_gain(untracked: FrameEvidence, people: Candidates, alternative: Candidates) -> float | None:
@@ -40,15 +64,17 @@ def best_alternative(
     number, group = connected_components(distances(ground, ground) < _GROUP_DISTANCE, directed=False)
     exchanges = [differing[group == k] for k in range(number)]
     gain = _gain(estimate, differing)
-    while gain > _LEAST_GAIN:
+    while exchanges:
         fewer = [np.concatenate([differing[:0], *exchanges[:k], *exchanges[k + 1 :]]) for k in range(len(exchanges))]
         gains = [_gain(estimate, exchanged) for exchanged in fewer]
         weakest = int(np.argmax(gains))
         if gains[weakest] <= gain - _LEAST_GAIN:
-            return estimate.pool.at(np.setxor1d(estimate.members, np.concatenate(exchanges))), gain
+            break
         gain = gains[weakest]
         del exchanges[weakest]
-    return None
+    if gain <= _LEAST_GAIN:
+        return None
+    return estimate.pool.at(np.setxor1d(estimate.members, np.concatenate(exchanges))), gain
 
 
 def _both(untracked: FrameEvidence, people: Candidates, alternative: Candidates) -> tuple[MapEstimate, Ints]:

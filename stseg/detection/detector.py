@@ -14,7 +14,7 @@ from stseg.arrays import Flags, ViewEvidence
 from stseg.bodies.box_fit import BoxNoise
 from stseg.bodies.views import BoxView, DetectorView, PixelView, ViewObservation, ViewObservations
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
-from stseg.detection.alternatives import best_alternative, likelihood_gain
+from stseg.detection.alternatives import followed_alternative, found_alternative
 from stseg.detection.evidence.birth_lattice import lattice
 from stseg.detection.evidence.pixel_lattice import PixelLattice
 from stseg.detection.explanation import explained_frame
@@ -24,7 +24,6 @@ from stseg.detection.prior import Prior
 from stseg.detection.problem import ScoreParameters
 from stseg.detection.score.scoring import CORE_MARGIN
 from stseg.detection.search.frame_search import FrameSearch
-from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.restarts import better_of, weak_members
 from stseg.geometry import Rig
 from stseg.noise.box_bias_estimate import BoxBiasEstimate
@@ -35,7 +34,7 @@ from stseg.noise.rim_estimate import RimEstimate
 from stseg.noise.torn_masks import is_unexplained, mask_log_likelihood
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
-from stseg.records.people import Alternative, Explanation
+from stseg.records.people import Explanation
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.view_health.reprojection_residuals import nearest_people, reprojection_residuals
 from stseg.view_health.view_failures import ViewFailures
@@ -116,7 +115,7 @@ class Detector:
         self, views: Sequence[ViewEvidence], predicted: PredictedTracks | None, proposals: Candidates | None = None
     ) -> Explanation:
         """Explain one frame as `explain_next`, by first guesses alone: of a session that has learned nothing."""
-        evidence = self._evidence(self.observe(views), self.body, predicted)
+        evidence = self.evidence(self.observe(views), self._prior(predicted, self.body))
         return explained_frame(self._search.whole(self._search.of_tracks(evidence), proposals))
 
     def explain_next(
@@ -142,13 +141,17 @@ class Detector:
         is_key = frame % self._key_interval == 0
         if learned.rims.is_young and (is_key or predicted is None) and not self._has_boxes:
             self._learn_first_rims(learned, included, _FIRST_FRAME_SEARCHES if predicted is None else 1)
-        explanation, is_searched = self._explained(learned, is_key, included, predicted, proposals)
+        evidence = self._evidence(learned, included, predicted)
+        explanation, is_searched = self._explained(learned, is_key, evidence, predicted, proposals)
         if failures.learn(explanation, self.views, observations):
             included = failures.kept(observations)
-            explanation, is_searched = self._explained(learned, is_key, included, predicted, proposals)
+            evidence = self._evidence(learned, included, predicted)
+            explanation, is_searched = self._explained(learned, is_key, evidence, predicted, proposals)
         if alternative is not None:
-            other, _ = self._explained(learned, False, included, alternative, None)
-            explanation = self._with_followed(explanation, other, learned, included)
+            followed = evidence.under(self._prior(alternative, learned.population.body))
+            untracked = evidence.under(self._prior(None, learned.population.body))
+            other = followed_alternative(self._search, followed, untracked, explanation)
+            explanation = replace(explanation, followed=other)
         if self._has_boxes:
             learned.box_noise.learn(explanation, self.views, included)
             learned.box_bias.learn(explanation, self.views, included)
@@ -167,12 +170,11 @@ class Detector:
         self,
         learned: Estimates,
         is_key: bool,
-        observations: ViewObservations,
+        evidence: FrameEvidence,
         predicted: PredictedTracks | None,
         proposals: Candidates | None,
     ) -> tuple[Explanation, bool]:
         """A frame's explanation by what has been learned, and whether the whole ground was searched for it."""
-        evidence = self._evidence(learned.rims.applied(observations), learned.population.body, predicted)
         tracks = self._search.of_tracks(evidence)
         is_new = learned.frames < self._key_interval
         if not (is_key or is_new) and predicted is not None and proposals is None:
@@ -180,26 +182,23 @@ class Detector:
             if explanation is not None:
                 return explanation, False
         estimate = self._search.whole(tracks, proposals)
-        if is_key and predicted is not None and not self._has_boxes and len(weak_members(estimate)):
-            untracked = self._evidence(evidence.observations, evidence.prior.body, None)
+        if is_key and predicted is not None and len(weak_members(estimate)):
+            untracked = evidence.under(self._prior(None, evidence.prior.body))
             people = self._search.without_tracks(untracked, estimate)
             estimate = better_of(estimate, self._search.repeated(estimate, people))
-            return _with_found(estimate, untracked, people), True
+            explanation = explained_frame(estimate)
+            found = found_alternative(estimate, untracked, explanation, people)
+            return replace(explanation, found=found), True
         return explained_frame(estimate), True
 
-    def _with_followed(
-        self, explanation: Explanation, other: Explanation, learned: Estimates, observations: ViewObservations
-    ) -> Explanation:
-        """A frame's explanation with one by alternative tracks, and what its evidence says of both."""
-        untracked = self._evidence(learned.rims.applied(observations), learned.population.body, None)
-        gain = likelihood_gain(untracked, explanation.people.candidates, other.people.candidates)
-        return replace(explanation, followed=Alternative(other, gain))
+    def _prior(self, predicted: PredictedTracks | None, body: BodyConfig) -> Prior:
+        return Prior.of(predicted, self.config, body, self.border)
 
     def _evidence(
-        self, observations: ViewObservations, body: BodyConfig, predicted: PredictedTracks | None
+        self, learned: Estimates, observations: ViewObservations, predicted: PredictedTracks | None
     ) -> FrameEvidence:
-        """Evidence of a frame under the prior of its predicted tracks and a population."""
-        return self.evidence(observations, Prior.of(predicted, self.config, body, self.border))
+        """Evidence of a frame by what has been learned, under the prior of its predicted tracks."""
+        return self.evidence(learned.rims.applied(observations), self._prior(predicted, learned.population.body))
 
     def _learn_first_rims(self, learned: Estimates, observations: ViewObservations, searches: int) -> None:
         """Learn the rims of a young session before its frame is explained, as if births cost nothing.
@@ -216,7 +215,7 @@ class Detector:
 
     def _by_births(self, observations: ViewObservations, learned: Estimates) -> Explanation:
         """A frame's explanation without tracks."""
-        evidence = self._evidence(observations, learned.population.body, None)
+        evidence = self.evidence(observations, self._prior(None, learned.population.body))
         return explained_frame(self._search.whole(self._search.of_tracks(evidence)))
 
     def _with_excluded_residuals(
@@ -231,13 +230,3 @@ class Detector:
         ]
         residual = reprojection_residuals(bodies, self.views, of_excluded, owners)
         return replace(explanation, residual=np.where(excluded, residual, explanation.residual))
-
-
-def _with_found(estimate: MapEstimate, untracked: FrameEvidence, people: Candidates) -> Explanation:
-    """The explanation by an estimate, and that by people of a search without tracks where the frame prefers them."""
-    explanation = explained_frame(estimate)
-    found = best_alternative(untracked, explanation.people.candidates, people)
-    if found is None:
-        return explanation
-    other = explained_frame(MapEstimate.of_members(estimate.evidence, found[0]))
-    return replace(explanation, found=Alternative(other, found[1]))

@@ -1,6 +1,9 @@
 """Evidence of one frame: observations of all views and the prior, and the detection problem of any candidates."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -60,6 +63,12 @@ class FrameEvidence:
     def scales(self) -> Singles:
         """Scales of their pixels (`stseg.detection.evidence.blob_scale`)."""
         return blob_scales(self.rasters, self.extremes, self.lattice, self.prior.config, self.prior.body)
+
+    def under(self, prior: Prior) -> FrameEvidence:
+        """The same frame under a prior of other tracks; what was found of its views without tracks is kept."""
+        other = copy(self)
+        object.__setattr__(other, "prior", prior)
+        return other
 
     def problem(self, pool: Candidates, bodies: ProjectedBodies, base: DetectionProblem | None) -> DetectionProblem:
         """The candidates of a pool as the kernels read them; `base` is the problem of the first ones, if there is one.
