@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from stseg.arrays import Ints
 from stseg.detection.explanation import explained_frame
 from stseg.detection.frame_evidence import FrameEvidence
+from stseg.detection.key_frames import followed_frame
 from stseg.detection.search.frame_search import FrameSearch
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.geometry.distances import distances, unmatched
@@ -26,7 +27,8 @@ def followed_alternative(
     search: FrameSearch, followed: FrameEvidence, untracked: FrameEvidence, explanation: Explanation
 ) -> Alternative:
     """The reading of a frame by alternative tracks, those of the evidence `followed`, beside its explanation."""
-    other = explained_frame(search.whole(search.of_tracks(followed)))
+    tracks = search.of_tracks(followed)
+    other = followed_frame(tracks, search) or explained_frame(search.whole(tracks))
     gain = likelihood_gain(untracked, explanation.people.candidates, other.people.candidates)
     return Alternative(other, gain)
 
