@@ -36,6 +36,7 @@ def _unrevised(_: object, frames: Sequence[TrackedFrame], first: int, stop: int)
 WHOLE: dict[str, tuple[str, Any]] = {
     "restart": (f"{_SEARCH}.restarted", lambda estimate, _: estimate),
     "searched afresh": (f"{_DETECTOR}.weak_members", lambda _: ()),
+    "alternatives": (f"{_DETECTOR}.found_alternative", lambda *_: None),
     "merging": (f"{_SEARCH}.merged", lambda estimate, *_: estimate),
     "fitted alternatives": (f"{_SEARCH}._fitted", lambda estimate, others: estimate.pool.at(others[:0])),
     "swaps": (f"{_DETECTOR}.FrameSearch", lambda ground, boxes, rounds, _: FrameSearch(ground, boxes, rounds, 0)),
