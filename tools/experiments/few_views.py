@@ -27,7 +27,8 @@ from stseg.io.recording.rigs import read_recording
 from stseg.records.point_probability import point_probability
 
 _VIEWS = (2, 3)
-_HEAD = ("recording", "views", "choices", "runs", "mean", "deviation", "least", "least by cameras", "wrong points")
+_SCORES = "mean", "deviation", "least", "least by cameras", "wrong points", "stated"
+_HEAD = "recording", "views", "choices", "runs", *_SCORES, "commit"
 Cameras = tuple[int, ...]
 
 
@@ -84,4 +85,4 @@ def main() -> None:
                 found = np.array(list(pool.map(run, *zip(*runs, strict=True))))
             lines.append(line(name, chosen, found.reshape(len(chosen), asked.runs, -1)))
             print(*lines[-1], flush=True)
-            write_table(asked.output / "few_views.csv", [[*_HEAD, "stated", "commit"], *lines])
+            write_table(asked.output / "few_views.csv", [_HEAD, *lines])
