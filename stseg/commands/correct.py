@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.options import Overwrite
+from stseg.commands.terminal.counts import counted
 from stseg.tasks import correction
 
 
@@ -44,4 +45,5 @@ def correct(
     """
     found = correction.correct(run_file, answers, output, overwrite=overwrite)
     changed = sum(answer.action != "keep" for answer in found.answers)
-    print(f"wrote {output}: {len(found.answers)} answers, {changed} changes; {len(found.run.tracks)} tracks")
+    counts = f"{counted(len(found.answers), 'answer')}, {counted(changed, 'change')}"
+    print(f"wrote {output}: {counts}; {counted(len(found.run.tracks), 'track')}")

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from stseg.arrays import Ints, Rows
 from stseg.commands.calibrate.scene import area_of
+from stseg.commands.terminal.counts import counted
 from stseg.commands.terminal.standard_error import warn
 from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
@@ -121,7 +122,7 @@ def _table(scores: Scores) -> Table:
         x0, y0, x1, y1 = scores.area
         place = f"x {x0:g} .. {x1:g}, y {y0:g} .. {y1:g} m"
     scale = "" if scores.scale == 1 else f", tracks scaled by {scores.scale:.3f}"
-    title = f"{scores.frames} frames, gate {scores.gate:g} m, {place}{scale}"
+    title = f"{counted(scores.frames, 'frame')}, gate {scores.gate:g} m, {place}{scale}"
     table = Table(title=title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
     found = {"MODA": scores.moda, "precision": scores.precision, "recall": scores.recall, "MODP": scores.modp}
     followed = {"MOTA": scores.mota, "IDF1": scores.idf1, "HOTA": scores.hota, "2 gates": scores.hota_2gate}

@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.options import Overwrite
+from stseg.commands.terminal.counts import counted
 from stseg.commands.terminal.standard_error import warn
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
@@ -71,7 +72,8 @@ def export(
         return
     with replacing(output, overwrite) as part:
         write_tracks(to, part, contents)
-    print(f"wrote {len(contents.trajectory)} rows of {len(contents.tracks)} tracks to {output}")
+    rows, tracks = counted(len(contents.trajectory), "row"), counted(len(contents.tracks), "track")
+    print(f"wrote {rows} of {tracks} to {output}")
 
 
 def _archive(to: str, output: Path, runs: Sequence[Run], overwrite: bool) -> None:

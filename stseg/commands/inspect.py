@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from stseg.commands.options import Overwrite
+from stseg.commands.terminal.counts import counted
 from stseg.commands.terminal.standard_output import output_console, table_of
 from stseg.errors import ConfigError
 from stseg.io.recording.rigs import read_recording
@@ -160,5 +161,5 @@ def _longest(overview: Overview) -> Table:
         seconds = f"{track['frames'] / overview.frame_rate:.1f}"
         numbers = (f"{track[name]:.0f}" for name in ("id", "frames", "first", "last"))
         rows.append((*numbers, seconds, f"{track['height']:.2f}", f"{track['score']:.1f}"))
-    title = f"the {len(longest)} longest of {len(overview.tracks)} tracks"
+    title = f"the {len(longest)} longest of {counted(len(overview.tracks), 'track')}"
     return table_of(("id", "frames", "first", "last", "seconds", "height m", "score"), rows, title)

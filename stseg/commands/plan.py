@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.options import Frames, Settings
+from stseg.commands.terminal.counts import counted
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.config_file import read_config
@@ -76,11 +77,11 @@ def _text(estimate: Forecast, recording: Recording) -> str:
     parts = ", ".join(
         f"{name} {_span(seconds)}" for name, seconds in (*shares, ("writing the run file", estimate.joining))
     )
-    size, segments = estimate.file_bytes / 2**20, f"{estimate.segments} segment{'s' * (estimate.segments != 1)}"
+    size, segments = estimate.file_bytes / 2**20, counted(estimate.segments, "segment")
     return "\n".join(
         [
-            f"recording   {estimate.frames} frames, {_span(hours * 3600)}, in {segments}",
-            f"run         {_span(estimate.seconds)} with {estimate.workers} workers",
+            f"recording   {counted(estimate.frames, 'frame')}, {_span(hours * 3600)}, in {segments}",
+            f"run         {_span(estimate.seconds)} with {counted(estimate.workers, 'worker')}",
             f"work        {parts}",
             f"run file    {size:.0f} MiB, {size / hours:.0f} MiB an hour; temporary files need the same space again",
         ]

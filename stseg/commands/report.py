@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.options import Frames, Overwrite
+from stseg.commands.terminal.counts import counted
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange, frames_of_run
 from stseg.io.runfile.runs import read_run
@@ -68,4 +69,5 @@ def report(
         camera_images=camera_images, names=names, overwrite=overwrite, progress=TerminalReporter(),
     )  # fmt: skip
     for path in written:
-        print(f"wrote {path}" if path != video else f"wrote {path}: {len(frames_of_run(run, chosen))} frames")
+        film = f": {counted(len(frames_of_run(run, chosen)), 'frame')}" if path == video else ""
+        print(f"wrote {path}{film}")

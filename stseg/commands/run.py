@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from stseg.commands.options import Frames, Settings
+from stseg.commands.terminal.counts import counted
 from stseg.engine.workers.worker_processes import prepare_workers
 from stseg.errors import ConfigError
 from stseg.io.runfile.layout import SUFFIXES, VolumeKind
@@ -149,4 +150,4 @@ def _require_alone(workers: int | None, scheduler: str | None, labels: Path | No
 
 def _summary(run: Run) -> str:
     people = len(set(run.trajectory["id"].tolist()))
-    return f"{run.path}: {people} tracks in frames {run.frames[0]} to {run.frames[-1]}"
+    return f"{run.path}: {counted(people, 'track')} in frames {run.frames[0]} to {run.frames[-1]}"

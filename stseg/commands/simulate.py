@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.calibrate.scene import size_of
+from stseg.commands.terminal.counts import counted
 from stseg.commands.terminal.standard_error import TerminalReporter
 from stseg.tasks import simulation
 
@@ -96,4 +97,5 @@ def simulate(
         alike=alike,
         seed=seed,
     )
-    print(f"{film.rig_path}: {film.frames} frames of {film.cameras} cameras; truth in {film.truth_path.name}")
+    size_of_film = f"{counted(film.frames, 'frame')} of {counted(film.cameras, 'camera')}"
+    print(f"{film.rig_path}: {size_of_film}; truth in {film.truth_path.name}")

@@ -19,6 +19,7 @@ from stseg.commands.correct import correct
 from stseg.commands.export import export
 from stseg.commands.report import report
 from stseg.commands.review import review
+from stseg.commands.terminal.counts import counted
 from stseg.identities.review.corrections import ACTIONS, Answer, Corrections, solve_corrections
 from stseg.identities.review.doubts import _together, find_doubts
 from stseg.io.answers import read_answers
@@ -179,6 +180,7 @@ def test_the_command_leaves_the_run_and_names_go_through(tmp_path: Path, capsys:
     answers = tmp_path / "answers.csv"
     answers.write_text("action,frame,id,other,name\nswap,14,1,2,\nname,,2,,Bo\n")
     correct(run, answers, output=tmp_path / "new.h5")
+    assert "2 answers, 2 changes; 2 tracks" in capsys.readouterr().out and counted(1, "answer") == "1 answer"
     old, new = read_run(run), read_run(tmp_path / "new.h5")
     rows = [(int(f), int(i), round(float(x), 2)) for f, i, x in new.trajectory[["frame", "id", "x"]]]
     assert (13, 1, 0.15) in rows and (14, 2, 0.15) in rows and (14, 1, 0.3) in rows and (13, 2, 0.3) in rows

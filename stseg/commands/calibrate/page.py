@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from stseg.arrays import Bytes
 from stseg.commands.calibrate.scene import area_of
 from stseg.commands.options import Overwrite
+from stseg.commands.terminal.counts import counted
 from stseg.errors import ConfigError, SourceError
 from stseg.io.outputs.whole_files import Inputs, require_output, write_file
 from stseg.io.recording.pictures import read_colour
@@ -65,7 +66,7 @@ def calibrate_page(
     floor = _plan(plan, x1 - x0, y1 - y0)
     page = calibration_page(names, frames, (x0, y0, x1, y1), floor, command)
     write_file(output, page.encode(), overwrite)
-    print(f"wrote {output}: {len(frames)} views (it shows camera frames); open it in a browser")
+    print(f"wrote {output}: {counted(len(frames), 'view')} (it shows camera frames); open it in a browser")
 
 
 def _frames(path: Path, chosen: tuple[int, ...]) -> list[Bytes]:
