@@ -141,11 +141,11 @@ class Detector:
         is_key = frame % self._key_interval == 0
         if learned.rims.is_young and (is_key or predicted is None) and not self._has_boxes:
             self._learn_first_rims(learned, included, _FIRST_FRAME_SEARCHES if predicted is None else 1)
-        evidence = self._evidence(learned, included, predicted)
+        evidence = self._learned_evidence(learned, included, predicted)
         explanation, is_searched = self._explained(learned, is_key, evidence, predicted, proposals)
         if failures.learn(explanation, self.views, observations):
             included = failures.kept(observations)
-            evidence = self._evidence(learned, included, predicted)
+            evidence = self._learned_evidence(learned, included, predicted)
             explanation, is_searched = self._explained(learned, is_key, evidence, predicted, proposals)
         if alternative is not None:
             followed = evidence.under(self._prior(alternative, learned.population.body))
@@ -194,7 +194,7 @@ class Detector:
     def _prior(self, predicted: PredictedTracks | None, body: BodyConfig) -> Prior:
         return Prior.of(predicted, self.config, body, self.border)
 
-    def _evidence(
+    def _learned_evidence(
         self, learned: Estimates, observations: ViewObservations, predicted: PredictedTracks | None
     ) -> FrameEvidence:
         """Evidence of a frame by what has been learned, under the prior of its predicted tracks."""
