@@ -157,6 +157,11 @@ class Recording:
         cameras = zip(self.rig.cameras, self.sources, strict=True)
         return replace(self, reduction=tuple(self._factor(camera, feed, rows) for camera, feed in cameras))
 
+    @property
+    def shows_cameras(self) -> bool:
+        """Whether any source holds frames of a camera, in which people may be recognised."""
+        return any(feed.source.kind in ("video", "images") for feed in self.sources)
+
     def pictured(self) -> Recording:
         """The recording with its cameras' colour frames in place of boxes, where `images` or a detector's video is."""
         sources = (

@@ -6,9 +6,9 @@ from typing import Protocol
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Observation
-from stseg.errors import SourceError
+from stseg.errors import InputError, SourceError
 from stseg.geometry import Camera
-from stseg.io.detections.source_detections import instance_image, read_source
+from stseg.io.detections.source_detections import SourceDetections, instance_image, read_source
 from stseg.io.recording.pictures import read_picture, reduced_view
 from stseg.io.recording.recording import Source, mask_passwords
 from stseg.io.recording.source_files import image_paths, is_detection_file, is_image_source, source_parts
@@ -63,18 +63,27 @@ class CountedStream:
 
 def open_boxes(source: Source, camera: Camera) -> CountedStream:
     """Boxes of a file or folder of detections, read whole at once; raises as `open_stream` does."""
-    table = read_source(source, camera.size).table
+    table = _detections(source, camera).table
     return CountedStream(table.frames or 0, table.at, np.unique(table.frame))
 
 
 def open_masks(source: Source, camera: Camera) -> CountedStream:
     """Instance images drawn from the masks of a file or folder of detections; raises as `open_stream` does."""
-    found = read_source(source, camera.size)
+    found = _detections(source, camera)
 
     def read_frame(number: int) -> Observation:
         return instance_image(found.kept, np.flatnonzero(found.kept.frame == number).tolist(), camera.size)
 
     return CountedStream(found.frames, read_frame, np.unique(found.kept.frame))
+
+
+def _detections(source: Source, camera: Camera) -> SourceDetections:
+    """The detections of a camera, which errors name."""
+    try:
+        return read_source(source, camera.size)
+    except InputError as error:
+        key = f"camera {camera.name}, {error.key}" if error.key else f"camera {camera.name}"
+        raise type(error)(error.place, key, error.found, error.expected) from error
 
 
 def open_images(source: Source, camera: Camera, factor: int) -> CountedStream:

@@ -85,7 +85,7 @@ def _inspect_rig(path: Path, pictures: Path | None, overwrite: bool) -> None:
         console.print(f"warning: {words}", style="yellow", soft_wrap=True)
     if pictures is not None:
         with_frames = write_source_pictures(recording, summaries, pictures, overwrite)
-        contents = "they show camera frames" if with_frames else "boxes on the ruled ground"
+        contents = "with camera frames" if with_frames else "without camera frames"
         print(f"wrote {len(summaries)} pictures to {pictures} ({contents})")
 
 
@@ -115,7 +115,7 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
     lengths = "".join(f", {name} {length:.1f} s" for name, length in o.track_seconds.items())
     span = "" if o.first_frame is None else f", {o.first_frame} to {o.last_frame}"
     return [
-        ("scene", f"{o.scene}: {len(o.cameras)} cameras ({', '.join(o.cameras)}), run of {o.created}"),
+        ("scene", f"{o.scene}: {counted(len(o.cameras), 'camera')} ({', '.join(o.cameras)}), run of {o.created}"),
         ("ground", f"x {o.x[0]:g} to {o.x[1]:g} m, y {o.y[0]:g} to {o.y[1]:g} m, cells of {o.cell:g} m"),
         ("planes", f"{o.planes} up to {o.top:g} m"),
         ("views", ", ".join(ground)),

@@ -124,10 +124,14 @@ def _run(tokens: list[str]) -> int:
 def _missing(error: MissingArgumentError, tokens: Sequence[str]) -> str:
     """The message for an option without a value, and for one that was left out."""
     names = () if error.argument is None else error.argument.names
-    if not names or any(token.partition("=")[0] in names for token in tokens):
+    if not names:
         return str(error)
     command = " ".join(error.command_chain or ())
-    return f"command line: {names[0]} is missing; see stseg {command} --help"
+    if given := [token for token in tokens if token.partition("=")[0] in names]:
+        return f"command line: {given[0]} needs a value; see stseg {command} --help"
+    unknown = [token for token in error.unused_tokens or () if token.startswith("--")]
+    misspelt = f"{unknown[0]} is no option, and " if unknown else ""
+    return f"command line: {misspelt}{names[0]} is missing; see stseg {command} --help"
 
 
 def _fail(message: str) -> int:

@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.options import Overwrite
+from stseg.commands.terminal.counts import counted
 from stseg.errors import ConfigError
 from stseg.tasks.review import write_review
 
@@ -41,4 +42,4 @@ def review(
     if most < 1:
         raise ConfigError("--most", "", most, "1 or more questions")
     count = write_review(run_file, output, most=most, camera_images=camera_images, overwrite=overwrite)
-    print(f"wrote {output}: {count} questions")
+    print(f"wrote {output}: {counted(count, 'question')}")

@@ -25,8 +25,8 @@ _DELAYS = range(-10, 11)
 """Frames by which a truth is tried to be early or late."""
 _DELAYED = 0.9
 """Distance of a delayed truth to the tracks, by that of the given one, at which the delay is named."""
-_DELAYED_ROWS = 50
-"""Least rows of a truth by which a delay is named: one of so many delays fits a few rows better by chance."""
+_FEW_ROWS = 50
+"""Rows of a truth below which no other reading is named: of so many, one fits a few rows by chance."""
 _LEAST_EXTENT = 1.0
 """Least spread of a truth that was scaled onto the tracks, gates: a truth shrunk to a point meets what stands still."""
 
@@ -66,7 +66,7 @@ def delay_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
         distance, _ = tree.query(places_by_frame(later, gate), distance_upper_bound=gate)
         mean[delay] = np.minimum(distance, gate).mean()
     best = min(mean, key=mean.__getitem__)
-    if len(truth) < _DELAYED_ROWS or mean[best] >= _DELAYED * mean[0]:
+    if len(truth) < _FEW_ROWS or mean[best] >= _DELAYED * mean[0]:
         return None
     distances = f"{mean[best]:.2f} m instead of {mean[0]:.2f} m from the truth"
     return f"tracks are {distances} if that is counted from frame {-best:+d}: is it late, or the video?"
@@ -79,6 +79,8 @@ def _readings(truth: Rows, trajectory: Rows, gate: float) -> Iterator[tuple[str,
             rows, ground = truth.copy(), scale * ground_of(truth) * signs
             rows["x"], rows["y"] = (ground[:, ::-1] if "exchanged" in axes else ground).T
             yield " ".join(filter(None, (unit, axes))), rows
+            if len(truth) < _FEW_ROWS:
+                return
     if offset := _offset(truth, trajectory, gate):
         later = truth.copy()
         later["frame"] += offset

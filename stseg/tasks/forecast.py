@@ -180,5 +180,6 @@ def _parts(job: Job) -> list[Segment]:
     """Short parts spread over the run, without a warm-up."""
     total = job.stop - job.first
     length = min(_FRAMES, max(1, total // _PLACES))
-    begins = [job.first + total * place // _PLACES + (total // _PLACES - length) // 2 for place in range(_PLACES)]
+    margin = max(total // _PLACES - length, 0) // 2
+    begins = [job.first + total * place // _PLACES + margin for place in range(_PLACES)]
     return [Segment(k, begin, begin, begin + length) for k, begin in enumerate(begins) if k == 0 or total > _PLACES]

@@ -183,7 +183,7 @@ def write_source_pictures(recording: Recording, summaries: list[SourceSummary], 
     for summary, view in zip(summaries, views, strict=True):
         picture = png_bytes(summary.picture(view, frame))
         write_png(folder / f"{summary.camera.name}.png", picture, overwrite, inputs)
-    return any(stream.source.kind in ("video", "images") for stream in pictured.sources)
+    return pictured.shows_cameras
 
 
 def _detections(stream: CameraSource, camera: Camera) -> SourceDetections | None:

@@ -215,7 +215,8 @@ def test_tables_are_whole_in_a_pipe(run_path: Path, stdout: Command, monkeypatch
 def test_an_option_that_was_left_out_is_missing(refusal: Command) -> None:
     assert "command line: -o is missing; see stseg run --help" in refusal("run", "rig.toml")
     assert "found the name of a folder, 'pics/'" in refusal("report", "run.h5", "-o", "pics/")
-    assert "requires an argument" in refusal("run", "rig.toml", "-o")
+    assert "--ouput is no option, and -o is missing" in refusal("run", "rig.toml", "--ouput", "run.h5")
+    assert "-o needs a value" in refusal("run", "rig.toml", "-o")
 
 
 POINTS = "camera,u,v,x,y\ncam1,10,40,0,0\ncam1,50,40,1,0\ncam1,30,30,0,1\n"

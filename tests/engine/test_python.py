@@ -273,3 +273,4 @@ def test_plans_share_segments_and_refuse_parts_that_are_none(rig_path: Path, ref
     assert seconds == pytest.approx([14.0, 10.0, 8.0, 6.0, 6.0])
     said = f"--frames: found '10:400', expected a part of the recording's frames, 0:{FRAMES}"
     assert said in refusal("plan", rig_path, "--frames", "10:400")
+    assert stseg.plan(rig_path, frames=(0, 1)).frames == 1

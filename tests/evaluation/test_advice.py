@@ -55,6 +55,8 @@ def test_a_late_truth_is_named(tracks: Rows) -> None:
 def test_tracks_that_match_or_are_bad_get_no_advice(tracks: Rows) -> None:
     assert reading_advice(moved(tracks, 1), tracks, GATE) is None is delay_advice(moved(tracks, 1), tracks, GATE)
     assert reading_advice(tracks[:0], tracks, GATE) is None is reading_advice(tracks, tracks[:0], GATE)
+    few = reading_advice(moved(tracks[:2], 1, frames=13), tracks, GATE)
+    assert few is None or "hardly a row" in few, "many shifts fit two rows by chance"
     chance, strange = np.random.default_rng(1), tracks.copy()
     low, high = strange["x"].min(), strange["x"].max()
     steps = chance.normal(0, 0.3, len(strange)).cumsum()

@@ -84,7 +84,7 @@ def test_gaps_weak_tracks_and_those_at_one_time_are_asked() -> None:
 def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys: Captured) -> None:
     run = write_small_run(tmp_path / "run.h5")
     review(run, output=tmp_path / "review.html")
-    assert "1 questions" in capsys.readouterr().out
+    assert "1 question\n" in capsys.readouterr().out
     with patch("stseg.tasks.review._LEAST_CHANCE", 1.0):
         review(run, output=tmp_path / "certain.html")
     assert "0 questions" in capsys.readouterr().out, "what is certain is not asked"

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from run_files import trajectory_of
 from scenes import looking
 
-from stseg.arrays import AnyArray, Boxes, Bytes, Rows
+from stseg.arrays import AnyArray, Boxes, Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
 from stseg.reporting.figures import backdrop
 from stseg.reporting.pictures.canvas import place_labels
@@ -173,6 +173,17 @@ def test_the_axis_of_a_body_is_inside_its_outline(camera: Camera, height: float)
     for polygon in polygons:
         inside = [cv2.pointPolygonTest(polygon.astype(np.float32), tuple(map(float, point)), True) for point in axis]
         assert min(inside) > -1
+
+
+def test_a_body_without_its_head_in_the_picture_has_its_id(monkeypatch: pytest.MonkeyPatch) -> None:
+    places = list[Floats]()
+    monkeypatch.setattr("stseg.reporting.pictures.overlay.chips", lambda _, centres, *__: places.append(centres))
+    people, view = trajectory_of((0, 1, 1.0, 0.0), (0, 2, 3.0, 1.0)), OverlayView(front_camera(), 640)
+    people["height"] = 1.7, 6.0
+    overlay(view.camera, GRID, None, people, 0, width=640)
+    above = view.pixel(np.array([3.0, 1.0]), 6.0)[1]
+    ((_, head), (_, cut)) = places[0]
+    assert above < 0 < cut < 100 and head == pytest.approx(view.pixel(np.array([1.0, 0.0]), 1.82)[1])
 
 
 def test_people_out_of_view_leave_no_trace_and_trails_end() -> None:

@@ -111,18 +111,27 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
             f"{names[first_view.view]} and {names[second_view.view]} disagree by {100 * first_view.off:.0f} cm: two "
             "views alone do not tell which of them is off"
         )
+    if not sentences and any(check.verdict.views):
+        sentences.append(_agreement_text(rig, check.verdict))
     silent = [name for name, one in zip(names, check.verdict.views, strict=True) if one is None]
     if silent and not check.swapped:
         sentences.append(f"too few people stand alone before {', '.join(silent)} to judge (fewer than {MIN_PEOPLE})")
-    if not sentences:
-        worst = max((one for one in check.verdict.views if one is not None), key=lambda one: one.off)
-        cell, most = f"a cell ({100 * rig.grid.cell:.0f} cm)", f"{names[worst.view]} most, by {100 * worst.off:.0f} cm"
-        if worst.off <= rig.grid.cell:
-            sentences.append(f"the views agree: none is off by more than {cell}; {most}")
-        else:
-            least = f"certainly by {100 * worst.certainly_off:.0f} cm"
-            sentences.append(f"no view is certainly off by more than {cell}; {most}, {least}: check more --frames")
     return sentences
+
+
+def _agreement_text(rig: Rig, verdict: Verdict) -> str:
+    """Sentence on views of which none is named."""
+    judged = [one for one in verdict.views if one is not None]
+    worst, doubtful = max(judged, key=lambda one: one.off), max(judged, key=lambda one: one.error)
+    cell = f"a cell ({100 * rig.grid.cell:.0f} cm)"
+    if doubtful.error > rig.grid.cell:
+        may = f"{rig.cameras[doubtful.view].name} may be by {100 * doubtful.error:.0f} cm"
+        return f"no view is certainly off by more than {cell}, but by so few people {may}: check more --frames"
+    most = f"{rig.cameras[worst.view].name} most, by {100 * worst.off:.0f} cm"
+    if worst.off <= rig.grid.cell:
+        return f"the views agree: none is off by more than {cell}; {most}"
+    least = f"certainly by {100 * worst.certainly_off:.0f} cm"
+    return f"no view is certainly off by more than {cell}; {most}, {least}: check more --frames"
 
 
 def swapped_text(rig: Rig, swapped: Sequence[tuple[int, int]]) -> str:

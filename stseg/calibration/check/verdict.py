@@ -68,6 +68,11 @@ class Disagreement:
         return math.sqrt(square / (1 + 1 / self.others))
 
     @property
+    def error(self) -> float:
+        """Standard error of the displacement, metres."""
+        return max(self.feet_error, self.heads_error) / math.sqrt(1 + 1 / self.others)
+
+    @property
     def certainly_off(self) -> float:
         """The same less two standard errors: at least so much, metres."""
         least = max(self.feet - 2 * self.feet_error, self.heads - 2 * self.heads_error, 0.0)

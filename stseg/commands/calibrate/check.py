@@ -58,12 +58,13 @@ def check(
         print(json.dumps(found.as_dict(), indent=2))
     else:
         _print(found)
+    contents = "with camera frames" if found.recording.shows_cameras else "without camera frames"
     if output is not None:
         found.write_page(output, overwrite)
-        print(f"wrote {output} (it shows camera frames)")
+        print(f"wrote {output} ({contents})")
     if pictures is not None:
         count = found.write_pictures(pictures, overwrite)
-        print(f"wrote {count} pictures to {pictures} (they show camera frames)")
+        print(f"wrote {count} pictures to {pictures} ({contents})")
 
 
 def _print(found: RigCheck) -> None:

@@ -54,7 +54,7 @@ class StreamOptions:
     """Streams of the rig file."""
 
     source_pattern: Annotated[str | None, Parameter(metavar="PATTERN")] = None
-    """Path of every camera's frames, `{name}` standing for the camera's name."""
+    """Path of every camera's frames, `{name}` standing for the camera's name; this or --sources is needed."""
     sources: Annotated[str | None, Parameter(metavar="A,B,...")] = None
     """Paths of the frames one by one, instead of a pattern."""
     source_kind: SourceKind = "video"

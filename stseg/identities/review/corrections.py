@@ -82,13 +82,13 @@ Piece = tuple[int, int]
 
 
 def _check(answer: Answer, first: dict[int, int], last: dict[int, int]) -> None:
-    ids = [answer.track, *([answer.other] if answer.action in ("swap", "join") else [])]
-    for identity in ids:
+    tracks = {"id": answer.track} | ({"other": answer.other} if answer.action in ("swap", "join") else {})
+    for column, identity in tracks.items():
         if identity not in first:
-            raise InputError(answer.place, "id", identity, "a track of the run")
+            raise InputError(answer.place, column, identity or "nothing", "a track of the run")
     if answer.action in ("swap", "split") and answer.frame is None:
         raise InputError(answer.place, "frame", "nothing", f"the frame of the {answer.action}")
-    if answer.frame is not None and not any(first[k] <= answer.frame <= last[k] for k in ids):
+    if answer.frame is not None and not any(first[k] <= answer.frame <= last[k] for k in tracks.values()):
         raise InputError(answer.place, "frame", answer.frame, f"a frame of track {answer.track}")
     if answer.action in ("swap", "join") and answer.track == answer.other:
         raise InputError(answer.place, "other", answer.other, "another track")

@@ -22,6 +22,8 @@ _RULE_STYLES = ((_RULE, 1), (mixed(_RULE, PAPER, 0.3), 2))
 """Colour and width of the ground's metres, and of its border."""
 _GRID_STYLES: tuple[tuple[Colour, int], ...] = (((255, 196, 64), 1), ((64, 220, 255), 2))
 """The same of `grid_picture`."""
+_LABEL_SHARES = np.linspace(1.0, 0.0, 9)
+"""Shares of a body's height, from above; the first that is in the picture has the id."""
 _POLE_COLOUR: Colour = (80, 80, 255)
 _MAX_LINES = 14
 _LINE_DISTANCES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
@@ -147,10 +149,12 @@ def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail:
 
 
 def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
-    """Ids above the heads."""
-    heads = view.pixel(ground_of(people), people["height"] + 0.12)
-    inside = np.isfinite(heads).all(axis=1) & (heads >= 0).all(axis=1) & (heads < view.size).all(axis=1)
-    heads, people = heads[inside], people[inside]
+    """Ids above the heads, or at the highest part of a body in the picture."""
+    ground, tops = ground_of(people), people["height"] + 0.12
+    axis = np.stack([view.pixel(ground, share * tops) for share in _LABEL_SHARES])
+    inside = np.isfinite(axis).all(axis=2) & (axis >= 0).all(axis=2) & (axis < view.size).all(axis=2)
+    seen = np.flatnonzero(inside.any(axis=0))
+    heads, people = axis[inside.argmax(axis=0)[seen], seen], people[seen]
     ids, bounds = people["id"].tolist(), (4, 4, view.size[0] - 4, view.size[1] - 4)
     chips(canvas, heads, [*map(str, ids)], map(track_colour, ids), 13, bounds)
 
