@@ -1,4 +1,4 @@
-"""Faults of the system: every file-system call of a run fails once, or is the last before a kill; nothing is lost.
+"""Faults of the system: file-system calls of a run fail, or are the last before a kill; `tools/faults.py` tries all.
 
 The run is a real one in a child process. A wrapper counts its calls of the system that write (open, write, fsync,
 rename, link, mkdir, unlink) and makes the n-th fail, write half, or kill the process. Afterwards the old output stands,
@@ -42,7 +42,7 @@ def places(calls: tuple[str, ...], fault: str) -> list[int]:
     for kind in dict.fromkeys(calls):
         own = [place for place, call in enumerate(calls) if call == kind]
         chosen |= {own[0], own[-1]}
-    if fault.startswith("kill"):
+    if fault == "kill":
         chosen |= set(range(max(place for place, call in enumerate(calls) if call == "write"), len(calls)))
     if fault == "short":
         chosen = {place for place in chosen if calls[place] == "write"}
@@ -50,9 +50,7 @@ def places(calls: tuple[str, ...], fault: str) -> list[int]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "fault", ["kill", "kill after", "short", *map(str, (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EACCES))]
-)
+@pytest.mark.parametrize("fault", ["kill", "short", str(errno.ENOSPC), str(errno.EACCES)])
 def test_a_fault_loses_nothing(driver: Driver, whole: tuple[Path, tuple[str, ...]], tmp_path: Path, fault: str) -> None:
     expected, calls = whole
     for at in places(calls, fault):

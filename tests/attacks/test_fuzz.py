@@ -14,7 +14,7 @@ from stseg.errors import printable
 from stseg.io.toml import parse_toml
 from stseg.io.untrusted.values import abbreviated, is_name, parse_number, parse_whole
 
-SEEDS = [(1_000_000, 10), *in_ci(((1_000_010, 50),))]
+SEEDS = [(1_000_000, 10), *in_ci(((1_000_010, 15),))]
 """First seed and number of mutated files of each target."""
 
 

@@ -215,6 +215,7 @@ QUICK = replace(CONFIG, belief=FEW)
 PASSING = ((-0.9, -0.3, 0.1, 0.0), (0.9, 0.3, -0.1, 0.0))
 
 
+@compiled_only
 def test_the_order_of_targets_does_not_matter() -> None:
     standing = people((0.0, 0.0), (0.5, 0.2))
     targets = [known(standing), known(standing[::-1])]

@@ -111,6 +111,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     yield count
 
 
+@pytest.mark.slow
 @compiled_only
 def test_features_tell_apart_who_turn_back(stdout: Command, tmp_path: Path) -> None:
     """By their motion they passed each other again; without images beside the boxes features alone know better."""

@@ -109,7 +109,7 @@ def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys:
     assert rows["x"][(rows["frame"] == 15) & (rows["id"] == 2)] == pytest.approx(0.15)
 
 
-@pytest.mark.parametrize("seed", [0, *in_ci(1, 2, 3, 4)])
+@pytest.mark.parametrize("seed", [0, *in_ci(1)])
 def test_every_answer_to_every_question_is_accepted(tmp_path: Path, seed: int) -> None:
     """Tracks that begin, end, meet and pass on to others anywhere."""
     lots = np.random.default_rng(seed)

@@ -200,6 +200,7 @@ def test_going_on_from_a_state_is_going_on() -> None:
             np.testing.assert_array_equal(fusion.fuse_and_learn(rest, *one).dense(), volume)
 
 
+@compiled_only
 def test_blind_single_and_hiding_views_learn_nothing() -> None:
     fusion = occupancy("pixels")
     running = fusion.new_error_rates()

@@ -76,6 +76,7 @@ def test_weights_fall_with_clutter_down_to_the_median(others: list[float], clutt
 KINDS: list[SamplingKind] = ["point", "footprint"]
 
 
+@compiled_only
 @drawn(15, rigs(most=2), st.sampled_from(KINDS))
 def test_cells_are_looked_up_where_they_project(rig: Rig, kind: SamplingKind) -> None:
     sampling = Sampling.of(rig, kind)

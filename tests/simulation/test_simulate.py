@@ -385,7 +385,7 @@ def test_command_changes_the_named_scene(tmp_path: Path, capsys: Captured) -> No
     recording = read_recording(tmp_path / "s" / "rig.toml")
     assert [camera.size for camera in recording.rig.cameras] == [(40, 32)]
     assert read_tracks_csv(tmp_path / "s" / "truth.csv")["frame"].max() == 1
-    assert "2 frames of 1 cameras" in capsys.readouterr().out
+    assert "2 frames of 1 camera;" in capsys.readouterr().out
 
 
 @compiled_only

@@ -153,8 +153,8 @@ def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
     ground, tops = ground_of(people), people["height"] + 0.12
     axis = np.stack([view.pixel(ground, share * tops) for share in _LABEL_SHARES])
     inside = np.isfinite(axis).all(axis=2) & (axis >= 0).all(axis=2) & (axis < view.size).all(axis=2)
-    seen = np.flatnonzero(inside.any(axis=0))
-    heads, people = axis[inside.argmax(axis=0)[seen], seen], people[seen]
+    chosen = np.flatnonzero(inside.any(axis=0))
+    heads, people = axis[inside.argmax(axis=0)[chosen], chosen], people[chosen]
     ids, bounds = people["id"].tolist(), (4, 4, view.size[0] - 4, view.size[1] - 4)
     chips(canvas, heads, [*map(str, ids)], map(track_colour, ids), 13, bounds)
 
