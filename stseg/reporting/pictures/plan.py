@@ -127,14 +127,13 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, 
 
 
 def _name_place(name: str, place: Floats, back: Floats, plan: PlanMap) -> tuple[float, float]:
-    """Middle of a camera's name: behind it, or where that would cover the numbers of the axes, before or beside it."""
+    """Middle of a camera's name: behind it; beside or before it at the canvas' end and at the numbers of the axes."""
     (wide, tall), space = text_size(name, 15), np.array(plan.size)
-    half = np.array([wide / 2, tall / 2])
-    across = np.array([-back[1], back[0]])
-    middles = [
-        np.clip(place + way * (14 + wide / 2, 22), (wide / 2 + 4, tall), space - (wide / 2 + 4, tall))
-        for way in (back, -back, across, -across)
-    ]
+    half, across = np.array([wide / 2, tall / 2]), np.array([-back[1], back[0]])
+    wished = [place + way * (14 + wide / 2, 22) for way in (back, across, -across, -back)]
+    inside = [np.clip(middle, (wide / 2 + 4, tall), space - (wide / 2 + 4, tall)) for middle in wished]
+    moved = [round(np.abs(one - other).max()) for one, other in zip(inside, wished, strict=True)]
+    middles = [inside[k] for k in np.argsort(moved, kind="stable")]
     free = (middle for middle in middles if not plan.covers_numbers(middle - half, middle + half))
     u, v = next(free, middles[0]).tolist()
     return u, v
