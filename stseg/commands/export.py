@@ -15,7 +15,7 @@ from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS, help_text, write_tracks
 from stseg.io.outputs.whole_files import Inputs, replacing, require_output
 from stseg.io.runfile.runs import Run, read_run
-from stseg.io.untrusted.values import abbreviated
+from stseg.io.untrusted.values import abbreviated, one_of
 
 _NAMED = "csv", "parquet", "geojson", "mf-json"
 """Formats of one run that hold names of tracks."""
@@ -54,7 +54,7 @@ def export(
         CSV with the columns id,name, for formats that hold names: csv, parquet, geojson, mf-json and the databases.
     """
     if to not in (*FORMATS, *ARCHIVES):
-        raise ConfigError("command line", "--to", repr(to), f"one of {', '.join((*FORMATS, *ARCHIVES))}")
+        raise ConfigError("command line", "--to", repr(to), one_of(to, (*FORMATS, *ARCHIVES)))
     if more and to not in ARCHIVES:
         raise ConfigError("command line", "RUN", f"{1 + len(more)} run files", f"one, or --to {' or '.join(ARCHIVES)}")
     if names is not None and to not in (*_NAMED, *ARCHIVES):
