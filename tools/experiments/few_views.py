@@ -58,7 +58,7 @@ def run(one: ResultSet, bench: Bench, cameras: Cameras, seed: int) -> list[float
 
 def line(name: str, chosen: Sequence[Cameras], found: Floats) -> list[object]:
     """One row of the table, of float64 (choice, run, 4)."""
-    mean, spread = found.mean((0, 1)), np.sqrt(found.var(1, ddof=1).mean(0))
+    mean, spread = found.mean((0, 1)), np.sqrt(found.var(1, ddof=min(found.shape[1] - 1, 1)).mean(0))
     each = found.mean(1)
     least = int(each[:, 0].argmin())
     scores = [f"{moda:.1f} / {idf1:.1f}" for moda, idf1, *_ in (mean, spread, each[least])]
