@@ -163,6 +163,7 @@ def ground_errors(scene: Walking, solution: SolvedViews) -> tuple[Floats, float]
     return np.abs(factor * (x - x.mean()) - (y - y.mean())), float(abs(factor))
 
 
+@pytest.mark.slow
 def test_the_whole_way_is_as_near_as_it_says_without_floor(scene: Walking, solution: SolvedViews) -> None:
     assert (solution.delay - solution.delay[0]).tolist() == DELAYS
     assert offsets_of(solution).tolist() == [-3, -7, 0]
@@ -220,6 +221,7 @@ def judge(places: list[ViewPlaces]) -> None:
     auto.require_merged(NAMES, places, auto.merge_views(places, auto.align_all(places, 5.0, 10, lambda: None)), 5.0, 10)
 
 
+@pytest.mark.slow
 def test_other_times_mirrors_few_and_wide_people_are_found(scene: Walking) -> None:
     a, b, c = true_walks(scene)
     judge([a, b, c])

@@ -127,6 +127,7 @@ def halfway(killed: Path, night: Path) -> Path:
     return night
 
 
+@pytest.mark.slow
 def test_a_flipped_byte_is_noticed_and_its_segment_made_anew(
     rig_path: Path, undisturbed: Path, halfway: Path, capsys: Captured
 ) -> None:
