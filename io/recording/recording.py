@@ -158,7 +158,7 @@ class Recording:
         return replace(self, reduction=tuple(self._factor(camera, feed, rows) for camera, feed in cameras))
 
     @property
-    def shows_cameras(self) -> bool:
+    def has_camera_frames(self) -> bool:
         """Whether any source holds frames of a camera, in which people may be recognised."""
         return any(feed.source.kind in ("video", "images") for feed in self.sources)
 

@@ -218,8 +218,8 @@ class Occupancy:
         units = np.column_stack([np.full(len(rates), body), visible, np.full(len(rates), reached - body)])
         supported = inside[near_cells][(people.evidence >= config.minimum_evidence)[cells.near_person[near_cells]]]
         filled_cells = np.array([len(supported), supported.sum()]) / reached
-        counted = np.divide(counts, units, out=np.zeros_like(counts), where=units > 0)  # a large cell holds no body
-        estimate.learn(counted, filled_cells, estimate.interval)
+        measured = np.divide(counts, units, out=np.zeros_like(counts), where=units > 0)  # a large cell holds no body
+        estimate.learn(measured, filled_cells, estimate.interval)
 
     def _assignment(self, i: int, explanation: Explanation) -> PixelAssignment:
         people, assigned = explanation.people, explanation.box_assignment[i]

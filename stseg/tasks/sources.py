@@ -183,7 +183,7 @@ def write_source_pictures(recording: Recording, summaries: list[SourceSummary], 
     for summary, view in zip(summaries, views, strict=True):
         picture = png_bytes(summary.picture(view, frame))
         write_png(folder / f"{summary.camera.name}.png", picture, overwrite, inputs)
-    return pictured.shows_cameras
+    return pictured.has_camera_frames
 
 
 def _detections(stream: CameraSource, camera: Camera) -> SourceDetections | None:

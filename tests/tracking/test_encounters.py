@@ -128,8 +128,7 @@ def switches(name: str, kind: str, stop: int) -> int:
 
 @compiled_only
 @pytest.mark.parametrize(
-    ("name", "kind"),
-    [("crossing", "pixels"), *in_ci(("border", "pixels"), ("crossing", "boxes"), ("meeting", "boxes"))],
+    ("name", "kind"), [("crossing", "pixels"), *in_ci(("border", "pixels"), *((name, "boxes") for name in SCENES))]
 )
 def test_nobody_is_taken_for_somebody_else(name: str, kind: str) -> None:
     """From boxes, and from silhouettes of the first six seconds, in which people cross."""

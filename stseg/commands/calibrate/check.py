@@ -58,7 +58,7 @@ def check(
         print(json.dumps(found.as_dict(), indent=2))
     else:
         _print(found)
-    contents = "with camera frames" if found.recording.shows_cameras else "without camera frames"
+    contents = "with camera frames" if found.recording.has_camera_frames else "without camera frames"
     if output is not None:
         found.write_page(output, overwrite)
         print(f"wrote {output} ({contents})")

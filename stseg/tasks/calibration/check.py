@@ -198,7 +198,7 @@ def _page(found: RigCheck) -> str:
     verdict = section("Verdict", *(note(escape(sentence)) for sentence in found.verdict))
     rows = [[escape(cell) for cell in row] for row in found.rows()]
     numbers = section("Views", table(COLUMNS, rows, len(rows)), note(READING))
-    holds = [note("These pictures hold frames of the cameras.")] if found.recording.shows_cameras else []
+    holds = [note("These pictures hold frames of the cameras.")] if found.recording.has_camera_frames else []
     views = section("Ground and poles", figures(grids, "pair"), *holds)
     ground = section("Coverage", figures([seen_by], "pair"))
     title = f"{found.recording.rig.name}: check of the rig"
