@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from stseg.errors import FormatError
+from stseg.errors import FormatError, one_of
 from stseg.io.track_csv import read_rows
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, one_of, parse_whole
+from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, parse_whole
 
 
 @dataclass(frozen=True)

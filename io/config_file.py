@@ -14,10 +14,10 @@ from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get
 
 from stseg.config import Config
 from stseg.config.keys import describe, is_user_key, values
-from stseg.errors import ConfigError
+from stseg.errors import ConfigError, one_of
 from stseg.io.toml import parse_toml, toml_value
 from stseg.io.untrusted.bounded_files import read_text, reading
-from stseg.io.untrusted.values import abbreviated, finite_number, one_of
+from stseg.io.untrusted.values import abbreviated, finite_number
 
 _OPTION = "--set"
 _HEAD = """# Configuration of stseg. Lines may be left out: what is not given has its default.

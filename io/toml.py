@@ -11,9 +11,9 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.errors import InputError, RigError
+from stseg.errors import InputError, RigError, one_of
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import EXPECTED, abbreviated, finite_number, is_name, is_path, one_of
+from stseg.io.untrusted.values import EXPECTED, abbreviated, finite_number, is_name, is_path
 
 ANY = -1
 """In a shape: any number of rows."""

@@ -15,8 +15,15 @@ A command turns an `StsegError` into one line on standard error and exit status 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 _LONGEST_KEY = 300
 """Characters of a key in an error: some stand in files."""
+_LONGEST_NAME = 60
+"""Characters of a name that is compared with those known."""
+_LONGEST_LIST = 600
+"""Characters of a list of names in an error: those of all our own fit."""
 
 
 def printable(text: str) -> str:
@@ -24,6 +31,15 @@ def printable(text: str) -> str:
     return "".join(
         character if character.isprintable() else character.encode("unicode_escape").decode() for character in text
     )
+
+
+def one_of(name: object, names: Iterable[str]) -> str:
+    """Expectation of an error in place of an unknown name: all names, and the one most like it."""
+    names = tuple(names)
+    close = get_close_matches(str(name)[:_LONGEST_NAME], names, 1)
+    known = ", ".join(names)
+    beginning = known if len(known) <= _LONGEST_LIST else f"{known[:_LONGEST_LIST]}..."
+    return f"one of {beginning}" + (f"; did you mean {close[0][:_LONGEST_NAME]}?" if close else "")
 
 
 class StsegError(Exception):

@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stseg.errors import FormatError
+from stseg.errors import FormatError, one_of
 from stseg.io.detections.record import DetectionList, Detections, Request, number, required_value
 from stseg.io.extras import load_extra
 from stseg.io.track_csv import read_rows
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text, reading
-from stseg.io.untrusted.values import one_of, parse_number
+from stseg.io.untrusted.values import parse_number
 
 COLUMNS = ("frame", "left", "top", "width", "height", "right", "bottom", "x", "y", "score", "class")
 """Our names of columns; x and y are the middle of a box."""

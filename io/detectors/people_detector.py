@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
-from stseg.errors import FormatError
+from stseg.errors import FormatError, one_of
 from stseg.io.detectors.layouts import LAYOUTS, ScoredBoxes, recognise
 from stseg.io.detectors.networks import Network
 from stseg.io.detectors.picture_fit import fit_picture
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import one_of, parse_whole
+from stseg.io.untrusted.values import parse_whole
 
 PERSON = "person"
 _LEAST_SCORE = 0.25

@@ -7,7 +7,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from reprlib import Repr
 from typing import TypeGuard
@@ -19,8 +18,6 @@ from stseg.io.untrusted import limits
 
 _LONGEST_VALUE = 60
 """Characters of a value in an error."""
-_LONGEST_LIST = 600
-"""Characters of a list of names in an error: those of all our own fit."""
 _REPR = Repr()
 _REPR.maxlevel, _REPR.maxlist, _REPR.maxdict = 2, 8, 4
 _REPR.maxstring = _REPR.maxother = _LONGEST_VALUE
@@ -135,15 +132,6 @@ def finite_number(value: object, largest: float = math.inf) -> float | None:
     except OverflowError:  # an int beyond the floats
         return None
     return number if math.isfinite(number) and abs(number) <= largest else None
-
-
-def one_of(name: object, names: Iterable[str]) -> str:
-    """Expectation of an error in place of an unknown name: all names, and the one most like it."""
-    names = tuple(names)
-    close = get_close_matches(str(name)[:_LONGEST_VALUE], names, 1)
-    known = ", ".join(names)
-    beginning = known if len(known) <= _LONGEST_LIST else f"{known[:_LONGEST_LIST]}..."
-    return f"one of {beginning}" + (f"; did you mean {close[0][:_LONGEST_VALUE]}?" if close else "")
 
 
 def abbreviated(value: object) -> str:

@@ -9,13 +9,13 @@ from cyclopts import Parameter
 from stseg.commands.options import Overwrite
 from stseg.commands.terminal.counts import counted
 from stseg.commands.terminal.standard_error import warn
-from stseg.errors import ConfigError
+from stseg.errors import ConfigError, one_of
 from stseg.io.answers import read_names
 from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS, help_text, write_tracks
 from stseg.io.outputs.whole_files import Inputs, replacing, require_output
 from stseg.io.runfile.runs import Run, read_run
-from stseg.io.untrusted.values import abbreviated, one_of
+from stseg.io.untrusted.values import abbreviated
 
 _NAMED = "csv", "parquet", "geojson", "mf-json"
 """Formats of one run that hold names of tracks."""

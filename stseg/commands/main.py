@@ -5,7 +5,6 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from difflib import get_close_matches
 from io import TextIOWrapper
 from itertools import pairwise
 from typing import Literal, NoReturn
@@ -14,7 +13,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError
 
 from stseg.commands.terminal.standard_error import patience, without_library_messages
 from stseg.commands.terminal.termination import INTERRUPTED, TERMINATED, Termination
-from stseg.errors import ConfigError, StsegError, printable
+from stseg.errors import ConfigError, StsegError, one_of, printable
 from stseg.import_path import leave_out_current_folder
 from stseg.io.machine import address_space, collect_rarely
 from stseg.version import __version__
@@ -171,9 +170,7 @@ def _app(tokens: Sequence[str]) -> App:
 def _require_command(tokens: Sequence[str]) -> None:
     """Refuse an unknown command here: to suggest one, cyclopts would import them all."""
     if tokens and tokens[0] not in (*COMMANDS, *_FLAGS):
-        close = get_close_matches(tokens[0], COMMANDS, 1)
-        hint = f"; did you mean {close[0]}?" if close else ""
-        raise ConfigError("command line", "", repr(tokens[0]), f"one of {', '.join(COMMANDS)}{hint}")
+        raise ConfigError("command line", "", repr(tokens[0]), one_of(tokens[0], COMMANDS))
 
 
 def _require_file_names(tokens: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from stseg.arrays import Complexes, Flags, Floats
-from stseg.errors import CalibrationError
+from stseg.errors import CalibrationError, one_of
 
 LensModel = Literal["pinhole", "fisheye"]
 COEFFICIENTS: Mapping[LensModel, tuple[str, ...]] = {
@@ -67,7 +67,7 @@ class Lens:
     def _require_sound(self, given: Floats) -> None:
         matrix, names = self.matrix, COEFFICIENTS.get(self.model, ())
         if not names:
-            raise CalibrationError("lens", "model", repr(self.model), f"one of {', '.join(COEFFICIENTS)}")
+            raise CalibrationError("lens", "model", repr(self.model), one_of(self.model, COEFFICIENTS))
         is_affine = matrix.shape == (3, 3) and matrix[1, 0] == 0 and matrix[2].tolist() == [0, 0, 1]
         if not (is_affine and min(matrix[0, 0], matrix[1, 1]) > _LEAST_FOCAL):
             expected = "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]"

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from stseg.engine.reporter import AnyReporter, reporter_of
-from stseg.errors import ConfigError
+from stseg.errors import ConfigError, one_of
 from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
 from stseg.io.untrusted import limits
-from stseg.io.untrusted.values import abbreviated, one_of, require_within
+from stseg.io.untrusted.values import abbreviated, require_within
 from stseg.simulation import NAMED, SceneFilm, SceneSpec, Spoil
 from stseg.simulation.spoiling.spoil import STRENGTHS
 

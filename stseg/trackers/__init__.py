@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import cast
 
-from stseg.errors import ConfigError
+from stseg.errors import ConfigError, one_of
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame, TrackingMethod
 
 TRACKERS = {
@@ -24,7 +24,7 @@ Piater 2006)."""
 def find_tracker(name: str) -> type[TrackingMethod]:
     """The tracker of that name."""
     if name not in TRACKERS:
-        raise ConfigError("--tracker", "", repr(name), f"one of {', '.join(TRACKERS)}")
+        raise ConfigError("--tracker", "", repr(name), one_of(name, TRACKERS))
     module, found = TRACKERS[name].split(":")
     return cast(type[TrackingMethod], getattr(import_module(module), found))
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from stseg.commands.calibrate.scene import SceneOptions, StreamOptions, size_of, words
 from stseg.commands.options import Overwrite
-from stseg.errors import CalibrationError, ConfigError
+from stseg.errors import CalibrationError, ConfigError, one_of
 from stseg.geometry import Camera, Rig
 from stseg.geometry.rig import is_mirrored
 from stseg.io.calibrations.foreign_camera import ForeignCamera
@@ -18,7 +18,6 @@ from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, gues
 from stseg.io.outputs.whole_files import Inputs, require_output
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
-from stseg.io.untrusted.values import one_of
 from stseg.tasks.calibration.automatic import camera_names
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Boxes, Bytes, Floats
-from stseg.errors import ConfigError
+from stseg.errors import ConfigError, one_of
 from stseg.geometry import Camera
 from stseg.geometry.rig import BODY_HEIGHT
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
@@ -29,7 +29,7 @@ class Spoil:
 
     def __post_init__(self) -> None:
         if self.kind not in STRENGTHS:
-            raise ConfigError("spoil", "kind", repr(self.kind), f"one of {', '.join(STRENGTHS)}")
+            raise ConfigError("spoil", "kind", repr(self.kind), one_of(self.kind, STRENGTHS))
         most = MAX_STRENGTHS[self.kind]
         if not 0 <= self.strength <= most:
             raise ConfigError("spoil", self.kind, f"{self.strength:g}", f"a strength from 0 to {most:g}")
