@@ -55,5 +55,6 @@ def started_process(target: Callable[..., None], *arguments: object) -> BaseProc
         with SafeChildren():
             process.start()
     except (OSError, EOFError) as error:
-        raise WorkerError("--workers", "", f"no process that can be started ({error})", "1 process") from error
+        expected = "1 process; a script calls stseg below `if __name__ == '__main__':`"
+        raise WorkerError("--workers", "", f"no process that can be started ({error})", expected) from error
     return process
