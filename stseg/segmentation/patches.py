@@ -69,6 +69,13 @@ class GroundPatches:
         return np.asarray(self.on_sheet(edge))
 
     @cached_property
+    def _counted_place(self) -> Ints:
+        """The same places; -1 beside the grid's polygon, too."""
+        if self.grid.polygon is None:
+            return self.place
+        return np.where(self.grid.inside().reshape(-1)[self.place], self.place, -1)
+
+    @cached_property
     def on_sheet_at(self) -> Labels:
         """Place on the flattened sheet of each cell of the flattened ground, int32 (ground cell,); -1 for none."""
         index = np.full(self.grid.shape[1] * self.grid.shape[2], -1, np.int32)
@@ -87,14 +94,18 @@ class GroundPatches:
         return ground
 
     def log_odds(self, volume: SparseVolume) -> Singles:
-        """A frame's log-odds on the sheet, float32 (plane, row, column), nats; nan where no view sees the cell."""
+        """A frame's log-odds on the sheet, float32 (plane, row, column), nats; nan where no view sees the cell.
+
+        Ground beside the grid's polygon is as empty as what is between patches: undecided, it would join a body at the
+        polygon's edge, and patches would grow over all of it.
+        """
         sheet = np.empty((self.grid.planes, *self.place.shape), np.float32)
         _fill_sheet(
             volume.of_cell.reshape(-1),
             volume.empty,
             volume.cell,
             volume.value,
-            self.place.reshape(-1),
+            self._counted_place.reshape(-1),
             self.on_sheet_at,
             _BETWEEN,
             sheet.reshape(self.grid.planes, -1),
@@ -172,7 +183,10 @@ def _fill_sheet(
     between: np.float32,
     sheet: Singles,
 ) -> None:
-    """Fill sheet (plane, place on the sheet); index (ground cell,) is each one's place on it, -1 for none."""
+    """Fill sheet (plane, place on the sheet); index (ground cell,) is each one's place on it, -1 for none.
+
+    `place` (place on the sheet,) is the ground cell of each, -1 for what is `between`.
+    """
     planes, ground = sheet.shape[0], len(index)
     for z in range(planes):
         for k in range(len(place)):
@@ -182,5 +196,5 @@ def _fill_sheet(
         if not 0 <= cell[c] - z * ground < ground:  # seldom: cells come plane by plane
             z = cell[c] // ground
         k = index[cell[c] - z * ground]
-        if k >= 0:
+        if k >= 0 and place[k] >= 0:
             sheet[z, k] = value[c]

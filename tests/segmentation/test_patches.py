@@ -105,3 +105,9 @@ def test_log_odds_on_the_sheet() -> None:
     sheet, inside = patches.log_odds(volume), patches.place >= 0
     np.testing.assert_array_equal(sheet[:, inside], dense.reshape(3, -1)[:, patches.place[inside]])
     assert (sheet[:, ~inside] < -20).all()
+    part = replace(GRID, polygon=np.array([(-6.0, -5.0), (0.0, -5.0), (0.0, 5.0), (-6.0, 5.0)]))
+    beside = GroundPatches.of(part, squares).log_odds(volume)
+    counts = inside & patches.on_sheet(part.inside())
+    assert counts.any() and (inside & ~counts).any()
+    np.testing.assert_array_equal(beside[:, counts], sheet[:, counts])
+    assert (beside[:, ~counts] < -20).all()
