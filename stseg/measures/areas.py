@@ -1,11 +1,14 @@
 """Zones and lines on the ground: people in zones, their visits, and crossings of lines by direction."""
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
+import shapely
 from scipy.special import expit, ndtr
 
 from stseg.arrays import Flags, Floats, Ints, Rows, by_track, columns, ground_of
+from stseg.geometry import Grid
 from stseg.geometry.grid import inside_polygon
 
 
@@ -31,15 +34,17 @@ class Zone:
         return np.asarray(ndtr(np.where(self.contains(ground), away, -away)))
 
     @property
-    def area(self) -> float:
-        """Square metres; a ring inside another one is a hole."""
-        total = 0.0
-        for k, ring in enumerate(self.rings):
-            x, y = ring.T
-            size = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
-            others = Zone("", self.rings[:k] + self.rings[k + 1 :])
-            total += -size if others.contains(ring[:1]).any() else size
-        return total
+    def crossing(self) -> str | None:
+        """Why a ring is no border, as where it crosses itself, in the words of shapely; None where all are."""
+        reasons = [shapely.is_valid_reason(shapely.Polygon(ring)) for ring in self.rings]
+        return next((reason for reason in reasons if reason != "Valid Geometry"), None)
+
+    def area_on(self, grid: Grid) -> float:
+        """Area that counts on a ground, square metres: nobody is tracked beside it."""
+        (x0, x1), (y0, y1) = grid.x, grid.y
+        ground = shapely.intersection(shapely.box(x0, y0, x1, y1), shapely.make_valid(shapely.Polygon(grid.corners)))
+        zone = reduce(shapely.symmetric_difference, [shapely.Polygon(ring) for ring in self.rings])
+        return float(shapely.intersection(zone, ground).area)
 
 
 @dataclass(frozen=True)
@@ -77,8 +82,8 @@ AWAY = 5.0
 """Gap of a track from which its person was away, seconds."""
 
 
-def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -> Rows:
-    """People in a zone in every frame of a run, COUNT (time,).
+def zone_counts(zone: Zone, area: float, trajectory: Rows, frames: Ints, frame_rate: float) -> Rows:
+    """People in a zone, of an area in square metres, in every frame of a run, COUNT (time,).
 
     A track exists with probability 1 / (1 + exp(-score)) of its row, and is inside with that of its place,
     independently of the others; the count's mean is the sum of their products p, its variance that of p (1 - p) and of
@@ -93,7 +98,7 @@ def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -
     rows["expected"] = np.bincount(index, present, len(frames))
     brief = np.bincount(index, present * (1 - present), len(frames))
     rows["deviation"] = np.sqrt(brief + (SYSTEMATIC_SHARE * rows["expected"]) ** 2)
-    rows["density"] = rows["people"] / max(zone.area, 1e-9)
+    rows["density"] = rows["people"] / (area or np.nan)
     return rows
 
 

@@ -62,11 +62,13 @@ def measure_tracks(trajectory: Rows, frames: Ints, frame_rate: float, grid: Grid
     areas
         Zones and lines.
     """
-    people = [zone_counts(zone, trajectory, frames, frame_rate) for zone in areas.zones]
+    sizes = [zone.area_on(grid) for zone in areas.zones]
+    pairs = zip(areas.zones, sizes, strict=True)
+    people = [zone_counts(zone, size, trajectory, frames, frame_rate) for zone, size in pairs]
     visits = [zone_visits(zone, trajectory, frame_rate, _PATIENCE) for zone in areas.zones]
     crossings = [line_crossings(line, trajectory, frame_rate, _BAND) for line in areas.lines]
-    shapes = zip(areas.zones, people, visits, strict=True)
-    zones = [_zone(z.name, z.area, count, stays, standard_error(count, frame_rate)) for z, count, stays in shapes]
+    shapes = zip(areas.zones, sizes, people, visits, strict=True)
+    zones = [_zone(z.name, size, count, stays, standard_error(count, frame_rate)) for z, size, count, stays in shapes]
     minutes = max(len(frames) / frame_rate / 60, 1e-9)
     lines = [_line(line.name, crossed, minutes) for line, crossed in zip(areas.lines, crossings, strict=True)]
     return Measures(

@@ -80,6 +80,8 @@ def read_areas(run: Run, zones: Path | str | None, lines: Path | str | None) -> 
     ):
         for noun, name, points in shapes:
             _require_on_ground(Path(file or ""), f"{noun} {name}", points, grid)
+    for zone in named:
+        _require_area(Path(zones or ""), zone, grid)
     return Areas(tuple(named) or (Zone("ground", (grid.corners,)),), tuple(drawn))
 
 
@@ -90,3 +92,11 @@ def _require_on_ground(file: Path, place: str, points: Floats, grid: Grid) -> No
         found = f"x {low[0]:g} to {high[0]:g}, y {low[1]:g} to {high[1]:g}"
         ground = f"x {grid.x[0]:g} to {grid.x[1]:g}, y {grid.y[0]:g} to {grid.y[1]:g}"
         raise FormatError(file, place, found, f"metres on the ground, which is {ground}")
+
+
+def _require_area(file: Path, zone: Zone, grid: Grid) -> None:
+    """Refuse a zone that crosses itself, or holds none of the ground on which people are tracked."""
+    if zone.crossing is not None:
+        raise FormatError(file, f"zone {zone.name}", zone.crossing, "rings that do not cross themselves")
+    if zone.area_on(grid) == 0:
+        raise FormatError(file, f"zone {zone.name}", "no ground within the rig's area", "a part of it")

@@ -24,6 +24,7 @@ from stseg.commands.calibrate.page import calibrate_page
 from stseg.commands.correct import correct
 from stseg.commands.measure import measure
 from stseg.commands.review import review
+from stseg.geometry import Grid
 from stseg.identities.review.corrections import ACTIONS, Answer, solve_corrections
 from stseg.io.answers import read_answers, read_names
 from stseg.io.areas import read_lines, read_polygons
@@ -88,6 +89,7 @@ SIZE = (64, 48)
 CAMERA = Camera("cam1", SIZE, np.eye(3), np.array([0.0, 0.0, -1.0]))
 OPTIONS = ImportOptions(SIZE, "m", 1.75)
 _GROUND = np.array([[0.1, 0.1], [0.3, 0.2], [5.0, 5.0]])
+_GRID = Grid((0.0, 6.0), (0.0, 6.0))
 _FRAMES, _NOTES = 20, {"config": {"a": 1}, "rig": {"b": "c"}}
 
 
@@ -196,7 +198,8 @@ def _live_table(path: Path) -> None:
 def _zones(path: Path) -> None:
     oracles.require_areas(zones := read_polygons(path))
     for zone in (Zone(name, rings) for name, rings in zones):
-        assert zone.contains(_GROUND).shape == (len(_GROUND),) and np.isfinite(zone.area)
+        assert zone.contains(_GROUND).shape == (len(_GROUND),)
+        assert zone.crossing or np.isfinite(zone.area_on(_GRID))
 
 
 def _lines(path: Path) -> None:

@@ -97,8 +97,21 @@ def test_short_absences_do_not_end_a_visit_and_holes_are_outside() -> None:
     found = measure_tracks(walk(1, x), np.arange(75), 10.0, GRID, Areas((zone,)))
     (visit,) = found.visits
     assert (visit["first"], visit["last"], bool(visit["entered"]), bool(visit["left"])) == (0, 44, False, True)
-    assert zone.area == pytest.approx(3.96)
+    assert zone.area_on(GRID) == pytest.approx(3.96)
     assert zone.contains(np.array([[0.5, 0.5], [0.0, 0.0]])).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("rings", "area"),
+    [
+        ([[(2, -1), (3, -1), (3, 1), (2, 1)], [(2.5, -1), (4, -1), (4, -2), (2.5, -2)]], 3.5),  # they share an edge
+        ([[(-1, -1), (1, -1), (1, 1), (-1, 1)], [(1, 0), (0, 1), (-1, 0), (0, -1)]], 2.0),  # a hole touches the border
+        ([[(4, 0), (7, 0), (7, 3), (4, 3)]], 2.0),  # of which two square metres lie within the ground
+    ],
+)
+def test_area_is_what_counts_of_touching_rings(rings: list[list[tuple[float, float]]], area: float) -> None:
+    zone = Zone("z", tuple(np.array(ring, float) for ring in rings))
+    assert zone.crossing is None and zone.area_on(GRID) == pytest.approx(area)
     found = measure_tracks(trajectory_of(), np.arange(5), 10.0, GRID, Areas((Zone("z", (SQUARE,)),), (UP,)))
     assert found.people["people"].tolist() == [0] * 5 and not len(found.tracks) and found.field["density"].sum() == 0
 
@@ -151,6 +164,8 @@ def test_areas_lie_on_the_ground_and_need_not_be_closed(tmp_path: Path) -> None:
     refused(FormatError, match, stseg.measure, run, path)
     path.write_text(json.dumps(feature("LineString", [[-90, 0], [-80, 0]])))
     refused(FormatError, "line a: found x -90 to -80", stseg.measure, run, None, path)
+    path.write_text(json.dumps(feature("Polygon", [[[0, 0], [0.5, 0.3], [0.5, 0], [0, 0.3]]])))
+    refused(FormatError, "zone a: found Self-intersection", stseg.measure, run, path)
     path = tmp_path / "zones.geojson"
     path.write_text(json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 0], [1, 1], [0, 0]]])))
     ((_, (open_ring, closed_ring)),) = read_polygons(path)
