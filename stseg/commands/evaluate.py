@@ -16,7 +16,7 @@ from stseg.commands.terminal.standard_output import output_console
 from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
-from stseg.evaluation.advice import delay_advice, reading_advice
+from stseg.evaluation.advice import delay_advice, outside_advice, reading_advice
 from stseg.evaluation.alignment import Alignment
 from stseg.io.runfile.layout import SUFFIXES
 from stseg.io.track_csv import read_tracks_csv
@@ -73,8 +73,8 @@ def evaluate(
         advice = _advice(scores, rows, trajectory)
     else:
         advice = delay_advice(rows, trajectory, gate) if align == "none" else None
-    if advice:
-        warn([advice])
+    outside = _outside(tracks, rows) if area is None and align == "none" else None
+    warn([words for words in (advice, outside) if words])
     if as_json:
         print(json.dumps(scores.as_dict(), indent=1))
     else:
@@ -91,6 +91,15 @@ def _advice(scores: Scores, truth: Rows, trajectory: Rows) -> str | None:
         if shared < len(truth) and 2 * scores.hits >= shared > 0:
             return f"tracks are of the frames {first} to {last}, the truth of more: give --frames {first}:{last + 1}"
     return reading_advice(truth, trajectory, scores.gate)
+
+
+def _outside(tracks: Path, truth: Rows) -> str | None:
+    """Whether the truth reaches beyond the area of a run file."""
+    if tracks.suffix.lower() not in SUFFIXES:
+        return None
+    from stseg.io.runfile.runs import read_run
+
+    return outside_advice(truth, read_run(tracks).recording.rig.grid)
 
 
 def _read(tracks: Path) -> Rows:

@@ -113,20 +113,23 @@ class FusedEvidence(NamedTuple):
 
 
 class FrameRecord(NamedTuple):
-    """A frame's explanation, fusion (which may be at work), APPEARANCE, EVENT and SHIFT of views, until its commit."""
+    """Results of a frame until its commit; the fusion may be at work."""
 
     explanation: Explanation
     fusion: Future[FusedEvidence]
     appearance: Rows
     events: Rows
     shifts: Rows
+    """APPEARANCE, EVENT of views, and SHIFT rows."""
+    used: Flags
+    """bool (view,): views with evidence that is used."""
 
 
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
     rows, parts, residuals, appearance, shifts, events = [], [], [], [], [], [commit.events]
     for fused in commit.frames:
-        explanation, fusion, rows_of_frame, of_views, measured = records.pop(fused.frame)
+        explanation, fusion, rows_of_frame, of_views, measured, _ = records.pop(fused.frame)
         rates = fusion.result().rates
         appearance.append(rows_of_frame)
         shifts.append(measured)

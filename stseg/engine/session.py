@@ -38,6 +38,7 @@ from stseg.records.tables import EVENT, SHIFT
 from stseg.trackers import Commit, FrameObservations, FusedFrame
 from stseg.trackers.alternative_tracks import AlternativeTracks
 from stseg.trackers.cut import CutTracker
+from stseg.trackers.rows import fill_views
 from stseg.view_health.blind_views import ExcludedViews, FrozenViews
 from stseg.view_health.image_shifts import image_shifts, shift_is_due
 
@@ -116,11 +117,12 @@ class Session:
             reason = f"{explanation.unfinished} candidates interact: not searched to the end"
             events = np.append(events, np.array([(frame, b"crowd", 0, 0, reason.encode())], EVENT))
         used = failures.kept(evidence)
+        is_used = np.array([view is not None for view in used], bool)
         fusion = self._submit(partial(self._fuse, frame, used, explanation, noise))
         with self.watch.time("appearance"):
             appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, used, frame_set.images)
         shifts = self._shifts.pop(frame, np.zeros(0, SHIFT))
-        self._records[frame] = FrameRecord(explanation, fusion, appearance, events, shifts)
+        self._records[frame] = FrameRecord(explanation, fusion, appearance, events, shifts, is_used)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
         with self.watch.time("tracking"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, used))
@@ -146,7 +148,9 @@ class Session:
         return replace(decision.explanation, residual=explanation.residual)
 
     def _committed(self, commit: Commit) -> CommittedFrames:
-        return committed_frames(within_area(commit, self.pipeline.rig), self._records, self.watch)
+        within, used = within_area(commit, self.pipeline.rig), {k: one.used for k, one in self._records.items()}
+        fill_views(within.trajectory, self.pipeline.rig, used)
+        return committed_frames(within, self._records, self.watch)
 
     def _submit(self, fuse: Callable[[], FusedEvidence]) -> Future[FusedEvidence]:
         if self._fusion is None:

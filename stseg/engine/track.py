@@ -92,7 +92,7 @@ def track(
         As the command: one line with the file, the key, what was found and what was expected.
     """
     resolved, force = config_of(config), Workforce(workers)
-    chosen, reporter = None if frames is None else FrameRange(*frames), reporter_of(progress)
+    chosen, reporter = FrameRange.of(frames), reporter_of(progress)
     given = resolved, tracker, volume, chosen, force, reporter, None if known is None else Path(known)
     recording = recording_of(rig, sources)
     if output is not None:

@@ -67,6 +67,7 @@ class Tracker:
         self._classes = classes
         self._session: Session | None = None
         self._next, self._is_finished = 0, False
+        self._first: int | None = None
         self._factors: list[int] = []
         self._kinds: list[str] = []
 
@@ -96,7 +97,11 @@ class Tracker:
             raise SourceError(place, "", f"a frame before frame {self._next}", "frames in the order of time")
         observations = in_rig_order(self.rig, views, place, self._classes)
         if self._session is None:
-            self._session, self._next = self._begin(observations, frame), frame
+            first = frame if self._first is None else self._first
+            if all(view is None for view in observations):  # of what kind the cameras are is not known yet
+                self._first, self._next = first, frame + 1
+                return []
+            self._session, self._next = self._begin(observations, first), first
         for camera, kind, view in zip(self.rig.cameras, self._kinds, observations, strict=True):
             if view is not None and _kind(view) != kind:
                 raise SourceError(place, f"camera {camera.name}", _kind(view), f"{kind}, as in the frames before")
@@ -124,7 +129,7 @@ class Tracker:
     def _begin(self, observations: Sequence[Observation], frame: int) -> Session:
         """The stages, for the kinds of the first observations; a blind camera is taken to be of the others' kind."""
         found = [None if view is None else _kind(view) for view in observations]
-        common = next((kind for kind in found if kind is not None), "masks")
+        common = next(kind for kind in found if kind is not None)
         self._kinds = [kind or common for kind in found]
         rows, grid = self.config.foreground.body_rows, self.rig.grid
         cameras = list(zip(self.rig.cameras, self._kinds, strict=True))

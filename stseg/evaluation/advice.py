@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from stseg.arrays import Rows, ground_of
 from stseg.errors import FormatError
 from stseg.evaluation.alignment import best_motion, moved_rows, number_met, places_by_frame, sampled
+from stseg.geometry import Grid
 
 _MATCHING, _GAIN = 0.5, 0.3
 """Least share of the truth's rows that meet tracks under a reading that is named, and least gain over the given one."""
@@ -25,6 +26,8 @@ _DELAYS = range(-10, 11)
 """Frames by which a truth is tried to be early or late."""
 _DELAYED = 0.9
 """Distance of a delayed truth to the tracks, by that of the given one, at which the delay is named."""
+_OUTSIDE_SHARE = 0.01
+"""Share of the truth's rows outside the area above which that is said."""
 _FEW_ROWS = 50
 """Rows of a truth below which no other reading is named: of so many, one fits a few rows by chance."""
 _LEAST_EXTENT = 1.0
@@ -50,6 +53,15 @@ def reading_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:
         alien = "tracks meet hardly a row of the truth: is it of this recording, with its frames, and in metres?"
         return alien if given < _ALIEN_SHARE else None
     return f"tracks meet {100 * given:.0f} % of the truth's rows, and {100 * best:.0f} % if the truth is {words}"
+
+
+def outside_advice(truth: Rows, grid: Grid) -> str | None:
+    """One sentence where much of a truth lies outside the area of a run, of whose people it counts all."""
+    outside = float((~grid.contains(ground_of(truth))).mean()) if len(truth) else 0.0
+    if outside <= _OUTSIDE_SHARE:
+        return None
+    words = "lie outside the area of the run, where nobody is tracked, and count as missed"
+    return f"{100 * outside:.0f} % of the truth's rows {words}: --area, or a truth without them, leaves them out"
 
 
 def delay_advice(truth: Rows, trajectory: Rows, gate: float) -> str | None:

@@ -153,7 +153,7 @@ def evaluate(
     Raises
     ------
     ConfigError
-        Where the gate is not above 0 or the area is turned inside out.
+        Where the gate is not above 0, the area is turned inside out, or frames are a pair.
     FormatError
         Where one is no such table, a position is not finite, or an id occurs twice in a frame.
     """
@@ -161,6 +161,8 @@ def evaluate(
         raise ConfigError("evaluation", "gate", gate, "metres, above 0")
     if area is not None and not (area[0] < area[2] and area[1] < area[3]):
         raise ConfigError("evaluation", "area", area, "x0, y0, x1, y1 in metres with x0 below x1 and y0 below y1")
+    if isinstance(frames, tuple):  # elsewhere a pair is first and stop
+        raise ConfigError("evaluation", "frames", frames, "a range, or an array of every frame")
     require_tables(truth=truth, tracks=trajectory)
     motion = best_motion(truth, trajectory, gate, align)
     sequence = align_frames(truth, moved_rows(trajectory, motion), gate, area, frames, ignore_flagged)

@@ -1,11 +1,11 @@
 """Zones and lines on the ground: people in zones, their visits, and crossings of lines by direction."""
 
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 import shapely
 from scipy.special import expit, ndtr
+from shapely.geometry.base import BaseGeometry
 
 from stseg.arrays import Flags, Floats, Ints, Rows, by_track, columns, ground_of
 from stseg.geometry import Grid
@@ -43,7 +43,9 @@ class Zone:
         """Area that counts on a ground, square metres: nobody is tracked beside it."""
         (x0, x1), (y0, y1) = grid.x, grid.y
         ground = shapely.intersection(shapely.box(x0, y0, x1, y1), shapely.make_valid(shapely.Polygon(grid.corners)))
-        zone = reduce(shapely.symmetric_difference, [shapely.Polygon(ring) for ring in self.rings])
+        zone: BaseGeometry = shapely.Polygon()
+        for ring in self.rings:
+            zone = zone.symmetric_difference(shapely.Polygon(ring))
         return float(shapely.intersection(zone, ground).area)
 
 

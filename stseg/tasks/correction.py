@@ -112,7 +112,7 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     rig = run.recording.reduced(config.foreground.body_rows).reduced_rig
     rows = CommittedRows(run.committed[kept], run.committed_events, run.appearance, run.known_people)
     tracks, identity = associated_tracks(rig, config, rows, run.recording.rig, constraints)
-    _require_obeyed(constraints, answered.places, identity)
+    _require_obeyed(constraints, answered.places, identity, rows.trajectory["frame"])
     numbers = _numbers(old[kept], identity, np.concatenate([tracks.events["id"], tracks.events["other"]]))
     solved = Tracks(*(_numbered(rows, numbers) for rows in (tracks.trajectory, tracks.boxes, tracks.events)))
     new = np.zeros(len(old), np.int64)
@@ -138,10 +138,10 @@ def answered_before(run: Run) -> AnsweredRows:
     return AnsweredRows.of_table(table, number)
 
 
-def _require_obeyed(constraints: Constraints, places: Sequence[str], identity: Ints) -> None:
-    """Raise InputError where a constraint on rows that are in tracks is not obeyed."""
+def _require_obeyed(constraints: Constraints, places: Sequence[str], identity: Ints, frame: Ints) -> None:
+    """Raise InputError where constraints contradict each other, or one on rows that are in tracks is not obeyed."""
     both = (identity[constraints.earlier] > 0) & (identity[constraints.later] > 0)
-    broken = np.flatnonzero(constraints.violated(identity) & both)
+    broken = np.flatnonzero(constraints.violated(identity) & both | constraints.contradictory(frame))
     if len(broken):
         raise InputError(places[broken[0]], "answer", "one that contradicts others", "answers that can all be true")
 

@@ -94,7 +94,7 @@ def plan(
     InputError
         As `stseg.track`.
     """
-    workforce, chosen = Workforce(workers), None if frames is None else FrameRange(*frames)
+    workforce, chosen = Workforce(workers), FrameRange.of(frames)
     recording = recording_of(rig)
     resolved = with_body_of(recording, config_of(config))
     require_effect(resolved, tracker)

@@ -86,7 +86,7 @@ def report(
     )
     found = run_of(run)
     inputs = Inputs(found.files, [true, named])
-    _require_outputs(page, folder, movie, None if frames is None else FrameRange(*frames), overwrite, inputs)
+    _require_outputs(page, folder, movie, FrameRange.of(frames), overwrite, inputs)
     film_frames = np.zeros(0, np.int64) if movie is None else frames_of_run(found, frames)
     if named is not None:
         found = found.with_names(read_names(named))

@@ -105,8 +105,11 @@ class SourceSummary:
         if outside > _OUTSIDE_SHARE:
             yield (
                 f"{name}: {100 * outside:.0f} % of its feet project outside the area: "
-                "is it this camera, and the image size right?"
+                "is it this camera, and the image size right? Where people walk there, a larger area keeps them apart "
+                "from those inside"
             )
+        if not found.kept.score[:].any():
+            yield f"{name}: all scores of its boxes are 0, and they count little: an unknown score is -1"
         excess = float((pixel[:, :2] > self.camera.size).any(axis=1).mean())
         if excess > _BEYOND_SHARE:
             yield f"{name}: {100 * excess:.0f} % of its boxes begin beyond the image: is the image size right?"

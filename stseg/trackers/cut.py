@@ -35,7 +35,7 @@ from stseg.segmentation.label_energy import BodyShape
 from stseg.segmentation.patches import GroundPatches, mark_places, people_squares
 from stseg.trackers.alternative_tracks import AcceptedAlternative, Reading
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
-from stseg.trackers.rows import TrackPlaces, event_rows, fill_views, trajectory_rows
+from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows
 from stseg.trackers.window_existence import TrackedFrame, WindowExistence
 from stseg.tracking.filter.prediction import earlier_detections, predicted_places, together
 from stseg.tracking.filter.track_filter import TrackFilter
@@ -225,7 +225,6 @@ class CutTracker:
             labels.append(SparseLabels(shape, cell, identity[blobs[k].cells.reshape(-1)[place]]))
             rows.append(self._rows(frames[k].fused, blobs[k], decision.identity[k]))
         trajectory = np.concatenate(rows)
-        fill_views(trajectory, self.rig)
         return Commit([frames[k].fused for k in kept], labels, trajectory, event_rows(decision.events), row)
 
     def _rows(self, fused: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:

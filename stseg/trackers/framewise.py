@@ -12,7 +12,7 @@ from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sparse_labels import SparseLabels
 from stseg.records.tables import WINDOW
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
-from stseg.trackers.rows import Event, TrackPlaces, event_rows, fill_views, trajectory_rows
+from stseg.trackers.rows import Event, TrackPlaces, event_rows, trajectory_rows
 from stseg.tracking.filter.track_filter import TrackFilter
 
 
@@ -31,7 +31,6 @@ class FramewiseTracker:
         grid, reach = self.rig.grid, self.config.occupancy.person_radius
         label, extent = _reached_cells(fused, tracks.ground, tracks.ids, grid, reach)
         rows = trajectory_rows(fused.frame, tracks, extent)
-        fill_views(rows, self.rig)
         return Commit([fused], [SparseLabels.whole(label)], rows, event_rows(events), np.zeros(0, WINDOW))
 
 

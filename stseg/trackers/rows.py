@@ -1,10 +1,11 @@
 """Rows of the trajectory table for one frame."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows, ground_of
+from stseg.arrays import Flags, Floats, Ints, Rows, ground_of
 from stseg.geometry import Rig
 from stseg.records.tables import EVENT, TRAJECTORY
 
@@ -45,13 +46,17 @@ def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats) -> Rows:
     return rows[np.argsort(ids, kind="stable")]
 
 
-def fill_views(rows: Rows, rig: Rig) -> None:
-    """Fill the numbers of views that see the cell above each place, of the plane at which most of them see it."""
+def fill_views(rows: Rows, rig: Rig, used: Mapping[int, Flags]) -> None:
+    """Fill the numbers of views that see the cell above each place, of the plane at which most of them see it.
+
+    `used` bool (view,) says of each frame which views count in it: not those without evidence, frozen or excluded.
+    """
     grid, cell = rig.grid, np.rint(rig.grid.cell_of(ground_of(rows))).astype(int)
     column, row = cell[:, 0].clip(0, grid.shape[2] - 1), cell[:, 1].clip(0, grid.shape[1] - 1)
     place = np.column_stack([grid.ground_x[column], grid.ground_y[row]])
-    views = np.sum([camera.sees(place, grid.heights[:, None]) for camera in rig.cameras], 0)
-    rows["views"] = views.max(0) * grid.contains(place)
+    counted = np.array([used[frame] for frame in rows["frame"].tolist()], bool).reshape(len(rows), len(rig.cameras))
+    sees = [camera.sees(place, grid.heights[:, None]) & counted[:, k] for k, camera in enumerate(rig.cameras)]
+    rows["views"] = np.sum(sees, 0).max(0) * grid.contains(place)
 
 
 def event_rows(events: list[Event]) -> Rows:

@@ -31,7 +31,7 @@ Feet = Sequence[tuple[Ints, Floats]]
 
 
 def agreement_warnings(cameras: Sequence[Camera], feet: Feet, by_centres: Callable[[], Feet]) -> list[str]:
-    """A warning that names the cameras whose feet meet those of other cameras no more often than by chance.
+    """A warning that names the cameras whose feet meet those of other cameras hardly more often than by chance.
 
     Where they meet if each box's left and top are its centre, `by_centres`, it asks for that.
     """
@@ -44,7 +44,7 @@ def agreement_warnings(cameras: Sequence[Camera], feet: Feet, by_centres: Callab
     if not (_strangers(cameras, some) and _strangers(cameras, every)):
         remedy = "are left and top the centres of its boxes? (name these columns x and y)"
     names = ", ".join(cameras[k].name for k in strangers)
-    return [f"{names}: people stand where other cameras see them no more often than by chance: {remedy}"]
+    return [f"{names}: people stand where other cameras see them hardly more often than by chance: {remedy}"]
 
 
 def _strangers(cameras: Sequence[Camera], feet: Feet) -> list[int]:

@@ -96,5 +96,5 @@ def _torn(cameras: Sequence[str], rates: Rows) -> list[str]:
         miss = rates["miss"][rates["view"] == view]
         if len(miss) and (share := float(np.median(miss))) > _TORN_MISS_RATE:
             words = f"view {name} misses {100 * share:.0f} % of people's bodies"
-            warnings.append(f"{words}: is its foreground torn, or are boxes missing?")
+            warnings.append(f"{words}: is its foreground torn, are boxes missing, or is its stream late (offset)?")
     return warnings

@@ -63,7 +63,14 @@ def test_a_crowd_that_is_searched_in_part_is_named(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize(
-    "arguments", [{"workers": 0}, {"tracker": "nothing"}, {"frames": (5, 5)}, {"frames": (0, FRAMES + 1)}]
+    "arguments",
+    [
+        {"workers": 0},
+        {"tracker": "nothing"},
+        {"frames": (5, 5)},
+        {"frames": (0, FRAMES + 1)},
+        {"frames": range(5)},
+    ],
 )
 def test_errors_are_those_of_the_command(rig_path: Path, arguments: Mapping[str, Any]) -> None:
     refused(stseg.InputError, r"found .*, expected", stseg.track, rig_path, **arguments)
@@ -130,6 +137,10 @@ def test_likelihoods_are_masks_and_frames_left_out_blind() -> None:
     assert np.concatenate([result.frames for result in results]).tolist() == [3, 4, 5, 6]
     refused(stseg.InputError, "frame 6", tracker.add, [boxes] * 4, frame=6)
     refused(stseg.InputError, r"frame set after finish", tracker.add, [boxes] * 4)
+    tracker = stseg.Tracker(RIG, tracker="frames")
+    assert tracker.add([None] * 4, frame=2) == [] == tracker.add({})  # of what kind they are is seen later
+    results = [*tracker.add([boxes] * 4), *tracker.finish()]
+    assert np.concatenate([result.frames for result in results]).tolist() == [2, 3, 4]
     tracker = stseg.Tracker(RIG, tracker="frames")
     tracker.add([Boxes(np.zeros((0, 4)), np.zeros(0)), None, None, None])
     mask = np.zeros(RIG.cameras[0].size[::-1], np.uint8)

@@ -261,3 +261,14 @@ def test_missing_rows_and_answers_that_cannot_be_are_refused(undisturbed: Path, 
     other = tmp_path / "other.h5"
     refused(InputError, "contradicts others", solved, undisturbed, other, "swap,20,1,2,", "keep,20,1,2,")
     assert not other.exists()
+
+
+def test_constraints_that_nobody_can_obey_are_named() -> None:
+    frame = np.array([0, 0, 5, 5, 9])
+    swapped = [(0, 3), (1, 2)]
+    for same, other, wrong in (
+        (swapped, [], 0),
+        ([*swapped, (0, 2)], [], 3),  # all four are one, two of them at once
+        ([(0, 2), (2, 4)], [(0, 4)], 1),
+    ):
+        assert np.count_nonzero(Constraints.of(same, other).contradictory(frame)) == wrong

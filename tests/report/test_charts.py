@@ -1,6 +1,7 @@
 """Charts, statistics and maps of a run agree with its tables."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -181,3 +182,5 @@ def test_a_heat_map_is_dark_where_much_is_and_red_where_blind() -> None:
     u, v = np.rint(plan.pixel(np.array([0.25, -0.65]))).astype(int)
     blue, green, red = picture[v, u].tolist()
     assert red > 150 > max(blue, green)
+    part = replace(RIG, grid=replace(GRID, polygon=np.array([(1.0, -1.0), (4.0, -1.0), (4.0, 2.0), (1.0, 2.0)])))
+    assert blind_map(part, views)[v, u].min() > 200  # beside the polygon nobody is sought

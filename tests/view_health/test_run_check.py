@@ -231,7 +231,7 @@ def test_what_is_right_is_not_doubted_but_a_pace_of_nobody(
         assert "are frame_rate and" in pace_warnings(1000 * recording.rig.frame_rate, *one.feet(), HEIGHT)[0]
 
 
-SHIFTED = "people stand where other cameras see them no more often than by chance"
+SHIFTED = "people stand where other cameras see them hardly more often than by chance"
 CENTRES = SHIFTED + ": are left and top the centres of its boxes?"
 
 

@@ -26,6 +26,16 @@ class FrameRange(NamedTuple):
         return f"{'' if self.first is None else self.first}:{'' if self.stop is None else self.stop}"
 
     @classmethod
+    def of(cls, span: FrameSpan) -> FrameRange | None:
+        """The range of a pair, as a Python caller gives it; None for all frames. Raises ConfigError."""
+        if span is None:
+            return None
+        given: object = span
+        if not isinstance(given, tuple) or len(given) != 2:  # as of a range
+            raise ConfigError("frames", "", abbreviated(span), "a pair (first, stop), half open")
+        return cls(*span)
+
+    @classmethod
     def parsed(cls, text: str | None) -> FrameRange | None:
         """The range of an option's text; None without one."""
         return None if text is None else cls.parse(text)

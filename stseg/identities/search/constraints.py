@@ -54,6 +54,19 @@ class Constraints:
         """Which of them identities (row,) do not obey, bool (constraint,)."""
         return np.asarray((identity[self.earlier] == identity[self.later]) != self.same)
 
+    def contradictory(self, frame: Ints) -> Flags:
+        """Which of them no identities obey, bool (constraint,); frame (row,) is that of every row.
+
+        Two people of rows that others make one; or one person of rows of which others make one in two places at once.
+        """
+        number, ends = len(frame), (self.earlier[self.same], self.later[self.same])
+        graph = coo_array((np.ones(len(ends[0])), ends), (number, number))
+        person = connected_components(graph, directed=False)[1] if number else np.zeros(0, np.int32)
+        named = np.unique([self.earlier, self.later])
+        once, count = np.unique(np.stack([person[named], frame[named]]), axis=1, return_counts=True)
+        is_twice = np.isin(person[self.earlier], once[0, count > 1])
+        return np.asarray(np.where(self.same, is_twice, person[self.earlier] == person[self.later]))
+
 
 NO_CONSTRAINTS = Constraints.of([], [])
 """No pairs of rows."""

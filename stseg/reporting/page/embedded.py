@@ -111,7 +111,7 @@ def embedded_json(
         Of tracks, by id.
     """
     grid = rig.grid
-    coverage = views.max(axis=0)[::-1]
+    coverage = np.where(grid.inside(), views.max(axis=0), np.uint8(len(rig.cameras)))[::-1]  # light beside the area
     data = {
         "frameRate": rig.frame_rate,
         "x": grid.x,

@@ -149,7 +149,9 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     most = max(len(rig.cameras), int(view_count.max()))
     tones = [(60, 60, 190), (120, 190, 250)]  # seen by none, by one; the more the lighter
     tones += [mixed((206, 199, 195), (252, 251, 250), (count - 1) / (most - 1)) for count in range(2, most + 1)]
-    paint_bins(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[view_count])
+    colours = np.array(tones, np.uint8)[view_count]
+    colours[~rig.grid.inside()] = PAPER  # nobody is sought there
+    paint_bins(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), colours)
     draw_ground(canvas, plan, rig)
     v = plan.size[1] - 38.0
     u = legend_of_tones(canvas, (76.0, v), tones)

@@ -78,10 +78,10 @@ def plan_map(rig: Rig, width: int = 1400, height: int = 1500, least_width: int =
 
 
 def _shade(canvas: Bytes, plan: PlanMap, grid: Grid, coverage: Bytes) -> None:
-    """Paint the cells; the area outside the rectangle stays paper."""
+    """Paint the cells; what is outside the rectangle, or the polygon, stays paper."""
     most = max(int(coverage.max()), 1)
     tones = np.array([_tone(count, most) for count in range(most + 1)], np.uint8)
-    picture = tones[coverage[::-1]]
+    picture = np.where(grid.inside()[..., None], tones[coverage], np.array(PAPER, np.uint8))[::-1]
     low = np.rint(plan.pixel(np.array([grid.x[0], grid.y[1]]))).astype(int)
     high = np.rint(plan.pixel(np.array([grid.x[1], grid.y[0]]))).astype(int)
     size = (int(high[0] - low[0]), int(high[1] - low[1]))
