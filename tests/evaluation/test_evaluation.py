@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -22,6 +22,7 @@ from stseg.arrays import Flags, Ints, Rows
 from stseg.commands.evaluate import evaluate as command
 from stseg.errors import ConfigError, FormatError
 from stseg.evaluation import evaluate
+from stseg.geometry import Grid
 from stseg.io.track_csv import POSITION, read_tracks_csv
 from stseg.records.tables import TRAJECTORY
 
@@ -291,10 +292,15 @@ def test_a_run_file_is_read_as_a_run(
     files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     runs = ModuleType("stseg.io.runfile.runs")
+    grid = Grid((-1.0, 0.5), (-100.0, 100.0))
+    rig = SimpleNamespace(recording=SimpleNamespace(rig=SimpleNamespace(grid=grid)))
     runs.read_trajectory = lambda _: read_tracks_csv(files[1])  # type: ignore[attr-defined]
+    runs.read_run = lambda _: rig  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "stseg.io.runfile.runs", runs)
     command(Path("night.h5"), files[1], as_json=True)
-    assert json.loads(capsys.readouterr().out)["MODA"] == 100
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["MODA"] == 100
+    assert "% of the truth's rows lie outside the area of the run" in printed.err
 
 
 @cases()
