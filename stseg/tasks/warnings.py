@@ -27,6 +27,8 @@ _UNLIKE = 1.4
 """Least ratio of that rate to the least one of all views or to the first guess: swaps leave 1.7 or more."""
 _SAMPLED_FRAMES = slice(0, 1000, 50)
 """Frames of a run without people whose masks are looked at: an hour would have to be decoded."""
+_BRIEF = 60.0
+"""Length of a recording below which people who hardly move may hide the background, seconds."""
 _MOVED = 1.0
 """Least shift of an image that counts as a moved camera, pixels."""
 
@@ -41,6 +43,7 @@ def run_warnings(run: Run, of_sources: Sequence[str] | None = None) -> list[str]
     config = parse_config(run.provenance.config, f"{run.path}: the configuration")
     return [
         *_emptiness(run),
+        *_brief_backgrounds(run),
         *explained_by_swap(
             run.recording,
             int(run.frames[0]),
@@ -71,6 +74,17 @@ def _emptiness(run: Run) -> Iterator[str]:
         yield "no view sees any cell"
     elif unseen > _BLIND_SHARE:
         yield f"no view sees {100 * unseen:.0f} % of the ground"
+
+
+def _brief_backgrounds(run: Run) -> Iterator[str]:
+    """Colour cameras without an empty scene, whose background few seconds showed."""
+    seconds, sources = len(run.frames) / run.frame_rate, zip(run.cameras, run.recording.sources, strict=True)
+    colour = [name for name, one in sources if one.source.kind in ("video", "images") and one.background is None]
+    if colour and seconds < _BRIEF:
+        yield (
+            f"{', '.join(colour)}: the background was learned from {seconds:.0f} s: people who hardly moved may be "
+            "part of it (background in the rig names an empty scene)"
+        )
 
 
 def _have_faint_masks(run: Run) -> bool:

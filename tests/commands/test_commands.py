@@ -92,7 +92,9 @@ def test_inspect_sums_up_a_run_its_people_and_ghosts(run_path: Path) -> None:
     assert list(overview.rates) == ["left", "right"]
     assert overview.rates["left"] == pytest.approx({"miss": 0.2, "clutter": 0.025, "person_clutter": 0.4})
     assert overview.bytes == run_path.stat().st_size
-    assert overview.warnings == ["view right has no evidence on any candidate: is it blind, or its calibration wrong?"]
+    brief, blind = overview.warnings
+    assert brief.startswith("left, right: the background was learned from 1 s: people who hardly moved may be part")
+    assert blind == "view right has no evidence on any candidate: is it blind, or its calibration wrong?"
     assert overview.people_per_minute == [1.5]
     assert overview.track_seconds == pytest.approx({"shortest": 0.6, "median": 0.9, "longest": 1.2})
     assert overview.ground_by_views == [0, 0, 1]
@@ -113,7 +115,8 @@ def test_inspect_as_json_and_on_a_screen_warns_of_empty_runs(run_path: Path, std
         assert said in screen
     assert re.search(r"left +20\.0 +2\.5 +40\.0 +1 *\n", screen)  # of each view, how it errs and what it denies
     path = write_run(tmp_path / "silent.h5", small_recording(tmp_path), trajectory_of(), np.array([0]), views=0)
-    assert read_run(path).warnings == ["no person was found", "no view sees any cell"]
+    assert read_run(path).warnings[:2] == ["no person was found", "no view sees any cell"]
+    assert "learned from 0 s" in read_run(path).warnings[2]
     assert "warning: no person was found" in stdout("inspect", path)
 
 
