@@ -34,8 +34,8 @@ class Zone:
         return np.asarray(ndtr(np.where(self.contains(ground), away, -away)))
 
     @property
-    def crossing(self) -> str | None:
-        """Why a ring is no border, as where it crosses itself, in the words of shapely; None where all are."""
+    def fault(self) -> str | None:
+        """Why a ring is no border, as where it intersects itself, in the words of shapely; None where all are."""
         reasons = [shapely.is_valid_reason(shapely.Polygon(ring)) for ring in self.rings]
         return next((reason for reason in reasons if reason != "Valid Geometry"), None)
 
@@ -45,7 +45,7 @@ class Zone:
         ground = shapely.intersection(shapely.box(x0, y0, x1, y1), shapely.make_valid(shapely.Polygon(grid.corners)))
         zone: BaseGeometry = shapely.Polygon()
         for ring in self.rings:
-            zone = zone.symmetric_difference(shapely.Polygon(ring))
+            zone = zone.symmetric_difference(shapely.make_valid(shapely.Polygon(ring)))
         return float(shapely.intersection(zone, ground).area)
 
 

@@ -95,8 +95,8 @@ def _require_on_ground(file: Path, place: str, points: Floats, grid: Grid) -> No
 
 
 def _require_area(file: Path, zone: Zone, grid: Grid) -> None:
-    """Refuse a zone that crosses itself, or holds none of the ground on which people are tracked."""
-    if zone.crossing is not None:
-        raise FormatError(file, f"zone {zone.name}", zone.crossing, "rings that do not cross themselves")
+    """Refuse a zone that intersects itself, or holds none of the ground on which people are tracked."""
+    if zone.fault is not None:
+        raise FormatError(file, f"zone {zone.name}", zone.fault, "rings that do not intersect themselves")
     if zone.area_on(grid) == 0:
         raise FormatError(file, f"zone {zone.name}", "no ground within the rig's area", "a part of it")

@@ -93,6 +93,16 @@ def test_boxes_in_memory_are_tracked_as_those_of_files(rig_path: Path) -> None:
     assert sum(len(result.detections) for result in results) == len(run.detections)
 
 
+def test_views_count_in_the_rows_of_frames_that_they_show() -> None:
+    rig, results = RIG, []
+    tracker = stseg.Tracker(rig)
+    for frame_set in box_frame_sets(rig, walkers(20), 0, 20):
+        results += tracker.add([None if k == 1 and frame_set.frame >= 12 else v for k, v in enumerate(frame_set.views)])
+    rows = tracker.tracks([*results, *tracker.finish()]).trajectory
+    views = [set(rows["views"][part].tolist()) for part in (rows["frame"] < 12, rows["frame"] >= 12)]
+    assert views == [{4}, {3}]
+
+
 class Tensor:
     """Numbers on another device: nothing reads them before `cpu`."""
 

@@ -31,15 +31,15 @@ def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats, is_open: F
     """
     evidence = estimate.evidence
     if len(evidence.rasters):
-        return _peaks(estimate, lattice_ground, is_open)
+        return _new_peaks(estimate, lattice_ground, is_open)
     free = [(member < 0).tobytes() for member in estimate.box_assignment]
     name = b"".join([*free, b"" if is_open is None or is_open.all() else is_open.tobytes()])
     if name not in evidence.lattice_peaks:
-        evidence.lattice_peaks[name] = _peaks(estimate, lattice_ground, is_open)
+        evidence.lattice_peaks[name] = _new_peaks(estimate, lattice_ground, is_open)
     return evidence.lattice_peaks[name]
 
 
-def _peaks(estimate: MapEstimate, lattice_ground: Floats, is_open: Flags | None) -> Candidates:
+def _new_peaks(estimate: MapEstimate, lattice_ground: Floats, is_open: Flags | None) -> Candidates:
     """The same, found anew; pixels are summed at one or two heights first, and at the others where those score well."""
     evidence = estimate.evidence
     prior, (rows, columns) = evidence.prior, lattice_ground.shape[:2]

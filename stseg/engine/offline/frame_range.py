@@ -31,7 +31,7 @@ class FrameRange(NamedTuple):
         if span is None:
             return None
         given: object = span
-        if not isinstance(given, tuple) or len(given) != 2:  # as of a range
+        if not isinstance(given, tuple | list) or len(given) != 2:  # as of a range
             raise ConfigError("frames", "", abbreviated(span), "a pair (first, stop), half open")
         return cls(*span)
 
