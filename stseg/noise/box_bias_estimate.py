@@ -78,7 +78,8 @@ class BoxBiasEstimate:
         self.offsets.forget()
         people = explanation.people
         information, sums = np.zeros((len(people), 3, 3)), np.zeros((len(people), 3))
-        for k, person, edges, _ in explained_boxes(explanation, views, observations, self._config):
+        for k, person, observation, box in explained_boxes(explanation, views, observations, self._config):
+            edges = observation.edges[box]
             middle, lower = _linear_offsets(views[k], people.ground[person], people.height[person], edges)
             lower[:, 0] += self._corrected
             free = people.found_share[k, person] >= _FREE_SHARE

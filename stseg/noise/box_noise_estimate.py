@@ -1,10 +1,15 @@
 """Noise of boxes, learned from the frames that are explained: one table for all views.
 
-E step: the offsets of each person's own boxes, over the posterior of the person's place and height. M step: the
-standard deviations that make them most likely, `weight` seconds of one person's box at the first guess among them, and
-what was counted since forgotten (`stseg.records.forgetting`). The lower
-edge has two, of one density that is steeper below the feet than above: with S_1, S_2 the sums of squares on either
-side of n boxes,
+A box moves the place at which its person is found, so its offsets from that person are smaller than its errors. With
+v the variance of an offset r over the posterior of place and height, and t the tolerance of the box, a share v / t^2 of
+it was spent on the place: E r^2 = sigma^2 (1 - v / t^2). Over n = sum (1 - v / t^2) degrees of freedom and S = sum r^2,
+
+    sigma^2 = S / n,
+
+whatever the noise was taken for before; boxes of a person seen by one view alone say nothing. `prior_weight` seconds of
+one person's box at the first guess are among them, and what was counted is forgotten (`stseg.records.forgetting`). The
+lower edge has two, of one density that is steeper below the feet than above: with S_1, S_2 the sums of squares on
+either side,
 
     sigma_1 = S_1^(1/3) sqrt((S_1^(1/3) + S_2^(1/3)) / n),
 
@@ -28,11 +33,14 @@ from stseg.bodies.box_fit import (
     fill_offsets,
     knots_of,
 )
-from stseg.bodies.views import BoxView, View, ViewObservations
+from stseg.bodies.views import BoxView, View, ViewObservation, ViewObservations
 from stseg.config import ErrorRateConfig
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation, People
 
+_LOWER_EDGE = [LOWER_EDGE_BELOW, LOWER_EDGE_ABOVE]
+_QUANTITY = [*range(LOWER_EDGE_BELOW + 1), LOWER_EDGE_BELOW]
+"""Where the offset of each tolerance stands among the four of a box: the lower edge has two."""
 _POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 """Places and heights that stand for a posterior: its means and variances are theirs (unscented transform)."""
 
@@ -50,47 +58,47 @@ class BoxNoiseEstimate:
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig, scale: float = 1.0) -> None:
         self._config, self._scale = config, scale
-        self.offsets = Forgetting((len(SCORE_KNOTS), 6), frame_rate, config.memory)
-        """(knot, 6): boxes, and their squared offsets, of the lower edge on either side of the feet; both times
-        seconds."""
+        self.offsets = Forgetting((len(SCORE_KNOTS), 2, len(TOLERANCE)), frame_rate, config.memory)
+        """(knot, 2, 5): degrees of freedom, and squared offsets; both times seconds."""
 
     @property
     def noise(self) -> BoxNoise:
         """The noise by all frames so far."""
-        first = PRIOR_NOISE.spread**2
-        both = PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW] + PRIOR_NOISE.spread[:, LOWER_EDGE_ABOVE]
-        first[:, LOWER_EDGE_BELOW:] *= PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW:] / both[:, None]
-        prior = np.column_stack([np.ones(len(first)), first])
-        count, squares = np.split(self.offsets.with_prior(self._config.prior_weight, prior), [1], axis=1)
-        spread = np.sqrt(squares / count)
-        root = np.cbrt(squares[:, LOWER_EDGE_BELOW:])
-        spread[:, LOWER_EDGE_BELOW:] = root * np.sqrt(root.sum(1, keepdims=True) / count)
+        first, ones = PRIOR_NOISE.spread**2, np.ones_like(PRIOR_NOISE.spread)
+        lower = PRIOR_NOISE.spread[:, _LOWER_EDGE]
+        ones[:, _LOWER_EDGE] = lower / lower.sum(1, keepdims=True)
+        counted = self.offsets.with_prior(self._config.prior_weight, np.stack([ones, first * ones], 1))
+        freedom, squares = counted[:, 0], counted[:, 1]
+        spread, root = np.sqrt(squares / freedom), np.cbrt(squares[:, _LOWER_EDGE])
+        both = freedom[:, _LOWER_EDGE].sum(1, keepdims=True)
+        spread[:, _LOWER_EDGE] = root * np.sqrt(root.sum(1, keepdims=True) / both)
         spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
         return BoxNoise(np.minimum(spread, PRIOR_NOISE.spread), self._scale)
 
     def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count one frame."""
         self.offsets.forget()
-        for k, person, edges, score in explained_boxes(explanation, views, observations, self._config):
-            self._count(score, _squares(views[k], explanation.people, person, edges) / self._scale**2)
+        for k, person, observation, box in explained_boxes(explanation, views, observations, self._config):
+            edges, tolerance = observation.edges[box], observation.tolerance[box]
+            counted = _counted(views[k], explanation.people, person, edges, tolerance)
+            self._count(observation.score[box], counted / np.array([[1.0], [self._scale**2]]))
 
-    def _count(self, score: Floats, squares: Floats) -> None:
+    def _count(self, score: Floats, counted: Floats) -> None:
         lower, share = knots_of(score)
-        boxes = np.column_stack([np.ones(len(squares)), squares])
         for knot, part in ((lower, 1 - share), (lower + 1, share)):
-            np.add.at(self.offsets.sums, knot, self.offsets.seconds(boxes * part[:, None]))
+            np.add.at(self.offsets.sums, knot, self.offsets.seconds(counted * part[:, None, None]))
 
 
 def explained_boxes(
     explanation: Explanation, views: Sequence[View], observations: ViewObservations, config: ErrorRateConfig
-) -> Iterator[tuple[int, Ints, Floats, Floats]]:
-    """Whole boxes of people that the other views support: for each view its number, people, edges and scores."""
+) -> Iterator[tuple[int, Ints, ViewObservation, Ints]]:
+    """Whole boxes of people that the other views support: each view's number, people, observation and their boxes."""
     people = explanation.people
     for k, (view, observation, owner) in enumerate(zip(views, observations, explanation.box_assignment, strict=True)):
         if isinstance(view, BoxView) and observation is not None and len(people):
             supported = people.supported_without(k, config.minimum_evidence)
             box = np.flatnonzero((owner >= 0) & supported[owner] & whole_boxes(observation.edges, view.camera.size))
-            yield k, owner[box], observation.edges[box], observation.score[box]
+            yield k, owner[box], observation, box
 
 
 def whole_boxes(edges: Floats, size: tuple[int, int]) -> Flags:
@@ -98,17 +106,24 @@ def whole_boxes(edges: Floats, size: tuple[int, int]) -> Flags:
     return np.asarray((edges[:, :2] > 0).all(1) & (edges[:, 2:] < np.array(size) - 1).all(1))
 
 
-def _squares(view: View, people: People, person: Ints, edges: Floats) -> Floats:
-    """Expected squared offsets of people's boxes, float64 (box, 5)."""
-    count, offsets = len(_POINTS), np.empty((len(_POINTS) * len(person), 4))
+def _counted(view: View, people: People, person: Ints, edges: Floats, tolerance: Floats) -> Floats:
+    """Degrees of freedom and squared offsets of people's boxes, float64 (box, 2, 5)."""
+    offsets = _offsets(view, people, person, edges)
+    mean, variance = (moment[:, _QUANTITY] for moment in (offsets.mean(0), offsets.var(0)))
+    is_below = mean[:, LOWER_EDGE_BELOW] <= 0
+    side = np.ones_like(tolerance)
+    side[:, _LOWER_EDGE] = np.column_stack([is_below, ~is_below])
+    counted = side[:, None] * np.stack([np.maximum(1.0 - variance / tolerance**2, 0.0), mean**2], 1)
+    return np.where(np.isnan(counted).any(1, keepdims=True), 0.0, counted)
+
+
+def _offsets(view: View, people: People, person: Ints, edges: Floats) -> Floats:
+    """Offsets of people's boxes over the posterior of each, float64 (point, box, 4); nan out of the image."""
     root = np.linalg.cholesky(people.covariance[person])
     tall = np.sqrt(people.sizes.height_variance[person])
     ground = people.ground[person] + (root @ _POINTS[:, None, :2, None])[..., 0]
     heights = people.sizes.height[person] + tall * _POINTS[:, 2:]
-    bodies = view.table.boxes_of(ground.reshape(-1, 2), heights.ravel())
+    bodies, offsets = view.table.boxes_of(ground.reshape(-1, 2), heights.ravel()), np.empty((ground[..., 0].size, 4))
     width, height = map(float, view.camera.size)
-    fill_offsets(bodies, np.tile(edges, (count, 1)), width, height, offsets)
-    is_below, squares = offsets[:, LOWER_EDGE_BELOW:] <= 0, np.nan_to_num(offsets**2)
-    lower = squares[:, LOWER_EDGE_BELOW:]
-    split = np.column_stack([squares[:, :LOWER_EDGE_BELOW], np.where(is_below, lower, 0), np.where(is_below, 0, lower)])
-    return np.asarray(split.reshape(count, len(person), len(TOLERANCE)).sum(0) / count)
+    fill_offsets(bodies, np.tile(edges, (len(_POINTS), 1)), width, height, offsets)
+    return offsets.reshape(len(_POINTS), len(person), 4)

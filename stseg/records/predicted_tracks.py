@@ -1,12 +1,14 @@
 """Predicted tracks of a frame, and the log-ratio of a candidate being one (the prior of HW12 eq. 21, per person).
 
 A track k of earlier frames exists with log-odds o_k, at N(x_k, C_k), with a height of N(h_k, v_k). A birth exists with
-log-odds `person` at any place of the resolution s, with the population's height. The log-ratio of candidate j being
+log-odds `person` at any place of the resolution a, with the population's height. The log-ratio of candidate j being
 track k against being a birth is
 
-    known_jk = o_k - person + log(s^2 / sqrt|C_k|) - d_jk^2 / 2 + log N(h_j; h_k, v_k) - log N(h_j; mean, spread^2)
+    known_jk = o_k - person + log(a_k / sqrt|C_k|) - d_jk^2 / 2 + log N(h_j; h_k, v_k) - log N(h_j; mean, spread^2)
 
-with d_jk the Mahalanobis distance of the places. Each track is assigned to one candidate at most.
+with d_jk the Mahalanobis distance of the places. The resolution a_k is s^2, or the area to which the last detection
+placed the track where that is larger: with few views many places near each other explain the same. Each track is
+assigned to one candidate at most.
 """
 
 from dataclasses import dataclass
@@ -40,6 +42,8 @@ class PredictedTracks:
     """Heights and widths; measurement noise of this frame included in their variances."""
     existence: Floats
     """float64 (n,): log-odds that the track still exists, nats."""
+    resolution: Floats | float = PLACE_RESOLUTION**2
+    """float64 (n,), or one for all: a_k, square metres."""
 
     def __len__(self) -> int:
         return len(self.ground)
@@ -51,7 +55,7 @@ class PredictedTracks:
     @cached_property
     def _concentration(self) -> Floats:
         """Log-ratio of the density at each track's place against that of a birth within the resolution, nats."""
-        return np.asarray(np.log(PLACE_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance))))
+        return np.asarray(np.log(self.resolution / np.sqrt(np.linalg.det(self.covariance))))
 
     def track_log_ratio(self, ground: Floats, height: Floats, body: BodyConfig, birth_log_odds: float) -> Floats:
         """Log-ratio of candidates (n, 2), (n,) being tracks against being births, nats, float64 (n, track)."""

@@ -54,7 +54,7 @@ def test_two_people_apart(kind: str) -> None:
     assert (found.evidence > 5).all() and (found.view_evidence > 0.5).all()
     assert found.view_evidence.shape == found.found_share.shape == (4, 2)
     spread = np.linalg.eigvalsh(found.covariance)
-    assert ((spread > 0) & (spread < 0.15**2)).all()
+    assert ((spread > 0) & (spread < 0.17**2)).all()
     assert (explanation.ghosts.evidence < 0).all()
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.config import Config
 from stseg.records.people import People
-from stseg.records.predicted_tracks import EXISTENCE_DECAY, PredictedTracks
+from stseg.records.predicted_tracks import EXISTENCE_DECAY, PLACE_RESOLUTION, PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.tracking.filter.tentative_tracks import SURE_VIEWS, tentative_log_odds
 from stseg.tracking.filter.track_state import BodyPlace, Measurement, PlacePosterior, TrackState
@@ -57,7 +57,7 @@ class TrackFilter:
         predicted = self._predictions(frame)
         return PredictedTracks(
             self._grounds(predicted),
-            np.array([self.body_place.covariance(t.covariance) for t in predicted]).reshape(-1, 2, 2),
+            self._covariances(predicted),
             Sizes(
                 np.array([t.height for t in predicted]),
                 np.array([t.height_variance for t in predicted]) + self.config.height_noise**2,
@@ -65,6 +65,7 @@ class TrackFilter:
                 np.array([t.width_variance for t in predicted]) + self.config.width_noise**2,
             ),
             np.array([t.log_odds for t in predicted]),
+            np.maximum(PLACE_RESOLUTION**2, np.sqrt(np.linalg.det(self._covariances(self.tracks)))),
         )
 
     def update(self, frame: int, people: People, ghosts: People, evidence: Sequence[ViewEvidence] = ()) -> Ints:
@@ -122,6 +123,10 @@ class TrackFilter:
     def _grounds(self, tracks: list[TrackState]) -> Floats:
         """Where bodies of tracks are expected, float64 (n, 2), metres."""
         return np.array([self.body_place.ground(track.state) for track in tracks]).reshape(-1, 2)
+
+    def _covariances(self, tracks: list[TrackState]) -> Floats:
+        """Covariances of the places of their bodies, float64 (n, 2, 2), square metres."""
+        return np.array([self.body_place.covariance(track.covariance) for track in tracks]).reshape(-1, 2, 2)
 
     def _predictions(self, frame: int) -> list[TrackState]:
         """All tracks as predicted for a frame, in their order; made once a frame."""
