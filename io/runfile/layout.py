@@ -76,6 +76,10 @@ ABOUT = {
 """Every table and its contents."""
 
 
+EXCLUDED_VIEWS = "excluded_views"
+"""A table of a segment's file alone, where there are any: views excluded before its first and after its last frame."""
+
+
 def table_types(views: int) -> dict[str, np.dtype[np.void]]:
     """The dtype of every table of a run with so many views."""
     return {

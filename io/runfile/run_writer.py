@@ -94,6 +94,8 @@ class RunWriter:
     def append(self, table: str, rows: Rows) -> None:
         """Add rows to one of the tables of `stseg.io.runfile.layout`, whose dtype they have."""
         with self._disk.step():
+            if table not in self._tables:
+                self._tables[table] = _GrowingTable(_create_table(self._file, table, rows.dtype))
             self._tables[table].append(rows)
 
     def finish(self, tracks: Rows) -> None:
@@ -238,5 +240,5 @@ def _create_table(file: h5py.File, name: str, dtype: np.dtype[np.void]) -> h5py.
     table = file.create_dataset(
         name, (0,), dtype, maxshape=(None,), chunks=(1024,), compression="gzip", compression_opts=1, shuffle=True
     )
-    table.attrs["about"] = layout.ABOUT[name]
+    table.attrs["about"] = layout.ABOUT.get(name, "of a segment alone")
     return table

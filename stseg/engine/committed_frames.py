@@ -38,6 +38,8 @@ class CommittedFrames:
         What detections look like.
     shifts : SHIFT (j,)
         Shifts of images from their backgrounds, where they are measured.
+    excluded : EXCLUDED_VIEW (i,)
+        Views that are excluded after each frame.
     """
 
     commit: Commit
@@ -47,6 +49,7 @@ class CommittedFrames:
     timings: Rows
     appearance: Rows
     shifts: Rows
+    excluded: Rows
 
     def __repr__(self) -> str:
         frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"
@@ -102,6 +105,7 @@ class CommittedFrames:
             self.timings,
             self.appearance[_inside(self.appearance["frame"], first, stop)],
             self.shifts[_inside(self.shifts["frame"], first, stop)],
+            self.excluded[_inside(self.excluded["frame"], first, stop)],
         )
 
 
@@ -123,16 +127,19 @@ class FrameRecord(NamedTuple):
     """APPEARANCE, EVENT of views, and SHIFT rows."""
     used: Flags
     """bool (view,): views with evidence that is used."""
+    excluded: Rows
+    """EXCLUDED_VIEW (n,)."""
 
 
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
-    rows, parts, residuals, appearance, shifts, events = [], [], [], [], [], [commit.events]
+    rows, parts, residuals, appearance, shifts, excluded, events = [], [], [], [], [], [], [commit.events]
     for fused in commit.frames:
-        explanation, fusion, rows_of_frame, of_views, measured, _ = records.pop(fused.frame)
+        explanation, fusion, rows_of_frame, of_views, measured, _, of_frame = records.pop(fused.frame)
         rates = fusion.result().rates
         appearance.append(rows_of_frame)
         shifts.append(measured)
+        excluded.append(of_frame)
         events.append(of_views)
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
@@ -149,6 +156,7 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
         watch.take(window),
         np.concatenate(appearance),
         np.concatenate(shifts),
+        np.concatenate(excluded),
     )
 
 

@@ -40,6 +40,7 @@ from stseg.trackers.alternative_tracks import AlternativeTracks
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.rows import fill_views
 from stseg.view_health.blind_views import ExcludedViews, FrozenViews
+from stseg.view_health.hand_over import NO_BORDER, Border, excluded_rows, take_over
 from stseg.view_health.image_shifts import image_shifts, shift_is_due
 
 _AHEAD = 2
@@ -61,6 +62,8 @@ class Session:
         Number of the first frame.
     factors
         Reduction factor of each camera's images, whose shifts are measured then; None to measure none.
+    border
+        Where it continues a segment before.
     """
 
     def __init__(
@@ -69,12 +72,17 @@ class Session:
         foregrounds: Sequence[ViewForeground],
         first: int,
         factors: Sequence[int] | None = None,
+        border: Border = NO_BORDER,
     ) -> None:
         self.pipeline, self.foregrounds, self.watch = pipeline, foregrounds, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         cameras = [camera.name for camera in pipeline.rig.cameras]
-        self._frozen, self._excluded = FrozenViews(len(cameras), pipeline.rig.frame_rate), ExcludedViews(cameras)
+        self._frozen = FrozenViews(len(cameras), pipeline.rig.frame_rate)
+        self._excluded = ExcludedViews(cameras, border)
         self._estimates = pipeline.detector.new_estimates()
+        take_over(self._estimates.failures, border.excluded)
+        self.excluded = border.excluded
+        """EXCLUDED_VIEW (n,): after the last frame."""
         self._error_rates = pipeline.occupancy.new_error_rates()
         self._records: dict[int, FrameRecord] = {}
         self._alternative = AlternativeTracks(pipeline.rig.frame_rate)
@@ -88,6 +96,11 @@ class Session:
         if isinstance(self._tracker, CutTracker):
             watch = self.watch  # and not self: a session in a cycle would outlive its segment with all its volumes
             self._tracker.solve_by(lambda solution: cuts.submit(watch.time("tracking")(solution)))
+
+    def follow(self, before: "Session") -> None:
+        """Exclude from the next frame on what another session does, which has had the same last frame."""
+        self._excluded.since = list(before._excluded.since)
+        take_over(self._estimates.failures, before.excluded)
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
         """The foreground of all views; to be called once for each frame set, in the order of time."""
@@ -113,6 +126,7 @@ class Session:
             explanation = detector.explain_next(self._estimates, frame, evidence, predicted, proposed, alternative)
         explanation = self._decided(frame, explanation)
         events = self._excluded.events(frame, frame_set.views, evidence, failures)
+        self.excluded = excluded_rows(frame, failures, self._excluded.since)
         if explanation.unfinished:
             reason = f"{explanation.unfinished} candidates interact: not searched to the end"
             events = np.append(events, np.array([(frame, b"crowd", 0, 0, reason.encode())], EVENT))
@@ -122,7 +136,7 @@ class Session:
         with self.watch.time("appearance"):
             appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, used, frame_set.images)
         shifts = self._shifts.pop(frame, np.zeros(0, SHIFT))
-        self._records[frame] = FrameRecord(explanation, fusion, appearance, events, shifts, is_used)
+        self._records[frame] = FrameRecord(explanation, fusion, appearance, events, shifts, is_used, self.excluded)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
         with self.watch.time("tracking"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, used))
@@ -194,6 +208,7 @@ def run_session(
     advance: Advance,
     cores: Callable[[], int] = two_cores,
     factors: Sequence[int] | None = None,
+    border: Border = NO_BORDER,
 ) -> Iterator[CommittedFrames]:
     """The results of frame sets, in the order of time, in a `Session` of their own, each as soon as it is decided.
 
@@ -201,7 +216,7 @@ def run_session(
     session has from the next frame on; with one it has no threads but those that decode.
     """
     with ExitStack() as threads:
-        session = Session(pipeline, foregrounds, first, factors)
+        session = Session(pipeline, foregrounds, first, factors, border)
         for frame_set, evidence in _prepared(session, iter(frame_sets), cores, threads):
             yield from session.add(frame_set, evidence)
             advance(frame_set.frame)

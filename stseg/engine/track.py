@@ -12,6 +12,7 @@ from stseg.config.keys import require_effect
 from stseg.engine.memory import ground_note, require_memory
 from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.detector_sources import with_boxes
+from stseg.engine.offline.due_segments import DueSegments
 from stseg.engine.offline.frame_range import FrameRange, FrameSpan, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.known import digest, read_known
@@ -184,7 +185,8 @@ def _indexed(recording: Recording, folder: WorkFolder, reporter: Reporter) -> St
 
 def _make_segments(job: Job, folder: WorkFolder, workforce: Workforce, reporter: Reporter) -> list[FinishedSegment]:
     """All segments of a job in the order of time; the missing ones are made."""
-    plan, finished = job.segments(), folder.whole_segments()
+    plan = job.segments()
+    due = DueSegments(plan, folder.whole_segments())
     for begin, end in job.gaps():
         reporter.note(f"no camera shows anything in frames {begin} to {end - 1}: a gap, at which all tracks end")
     if not plan:
@@ -192,11 +194,10 @@ def _make_segments(job: Job, folder: WorkFolder, workforce: Workforce, reporter:
         raise ConfigError("--frames", "", found, "a part that some camera shows")
     for path in folder.broken:
         reporter.note(f"{path}: its bytes have changed since it was written; made anew")
-    if finished:
-        reporter.note(f"{len(finished)} of {len(plan)} segments are there already")
-    missing = [segment for segment in plan if segment.index not in finished]
+    if due.finished:
+        reporter.note(f"{len(due.finished)} of {len(plan)} segments are there already")
+    missing = [segment for segment in plan if segment.index not in due.finished]
     done = job.stop - job.first - sum(segment.stop - segment.first for segment in missing)
     with reporter.progress("tracking", job.stop - job.first, done) as advance:
-        for segment, path in workforce.make(job, missing, folder.draft, advance, reporter.note):
-            finished[segment.index] = path
-    return [FinishedSegment(segment, finished[segment.index]) for segment in plan]
+        workforce.make(job, due, folder.draft, advance, reporter.note)
+    return [FinishedSegment(segment, due.finished[segment.index]) for segment in plan]

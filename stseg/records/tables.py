@@ -128,6 +128,20 @@ SHIFT = columns("frame:<i8 view:<i4 u:<f4 v:<f4")
 """Shift of a colour view's picture since its background was learned, pixels, every other second."""
 
 
+EXCLUDED_VIEW = np.dtype(
+    [
+        ("frame", "<i8"),  # after which the view is in this state
+        ("view", "<i4"),
+        ("since", "<i8"),  # first frame from which it is excluded; -1 where it counts, unproven
+        ("knocked", "u1"),
+        ("informedness", "<f8", (2,)),  # usual one: seconds of one person, and weighted sum; 0 where it had no better
+        ("deviation", "<f8", (3, 2)),  # of it, by span: seconds, and weighted sum of squares
+        ("share", "<f8", (3,)),  # of people that a knocked view showed: frames, and sums of the share and its square
+    ]
+)
+"""One row per view that is excluded where a segment ends, with what the next one needs to know of it."""
+
+
 ANSWER = columns("row:<i8 other:<i8 people:u1")
 """Number of people that two committed rows show by an answer, by their index: 1, 2, or 0 for a row that is no person.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Observation, Rows, ViewEvidence
 from stseg.records.tables import EVENT, reason_of
+from stseg.view_health.hand_over import Border
 from stseg.view_health.view_failures import ViewFailures
 
 _NO_EVIDENCE = "is frozen, or its light changes: excluded"
@@ -17,11 +18,21 @@ _KNOCKED = "shows people beside their places, as after a push: excluded"
 
 
 class ExcludedViews:
-    """Events of views of named cameras that are excluded although they deliver: where that begins and ends."""
+    """Events of views of named cameras that are excluded although they deliver: where that begins and ends.
 
-    def __init__(self, cameras: Sequence[str]) -> None:
-        self._cameras = cameras
-        self._since: list[int | None] = [None] * len(cameras)
+    Parameters
+    ----------
+    cameras
+        Their names.
+    border
+        What was excluded before, and the first frame of which there are events.
+    """
+
+    def __init__(self, cameras: Sequence[str], border: Border) -> None:
+        self._cameras, self._first = cameras, border.first
+        since = dict(zip(border.excluded["view"].tolist(), border.excluded["since"].tolist(), strict=True))
+        self.since = [None if since.get(k, -1) < 0 else since[k] for k in range(len(cameras))]
+        """First frame from which each view is excluded; None where it counts."""
 
     def events(
         self, frame: int, observations: Sequence[Observation], evidence: Sequence[ViewEvidence], failures: ViewFailures
@@ -38,14 +49,14 @@ class ExcludedViews:
             The views that are excluded from it for what they show.
         """
         reasons = []
-        for k, name in enumerate(self._cameras):
-            since = self._since[k]
+        for k, name in enumerate(self._cameras if frame >= self._first else ()):
+            since = self.since[k]
             excluded = observations[k] is not None and (evidence[k] is None or failures.excluded[k])
             if excluded and since is None:
-                self._since[k] = frame
+                self.since[k] = frame
                 reasons.append(f"camera {name} {_reason(evidence[k], bool(failures.knocks.knocked[k]))}")
             elif since is not None and not excluded and observations[k] is not None:
-                self._since[k] = None
+                self.since[k] = None
                 reasons.append(f"camera {name} counts again, after {frame - since} frames")
         return np.array([(frame, b"blind", 0, 0, reason_of(reason)) for reason in reasons], EVENT)
 

@@ -12,9 +12,10 @@ chance: the difference is more than 4.6 of its standard deviations. The deviatio
 measurements have shown while the view was sound, so a detector that misses people in single frames excludes no view.
 J of the shortest span must be below 0.7 of the usual one, too.
 A low J and its deviations count in the usual ones as soon as it has come back without a failure.
-A failing view is excluded until J of the shortest span has come back. The usual J and the deviation stand while it
-fails. The usual J counts in J now where few people were measured of late, so a view without people comes back by
-itself. A view of which each measurement deviates by s is found to show nothing after about (5 s / J)^2 measurements.
+A failing view is excluded until J of the shortest span has come back. The usual J counts in J now where few people were
+measured of late, so a view without people comes back by itself. The usual J and the deviation stand until the view has
+shown people again.
+A view of which each measurement deviates by s is found to show nothing after about (5 s / J)^2 measurements.
 
 A view that never showed more, since its calibration is wrong, has no better past to be measured by. Where its usual J
 is less than 0.7 of the median usual J of four other sound views or more, that median is expected of it; among fewer it
@@ -81,6 +82,8 @@ class ViewFailures:
         self._rate, self._config = frame_rate, config
         self.failing, self.excluded = np.zeros(views, bool), np.zeros(views, bool)
         """bool (view,): views whose informedness is too small, and those that are excluded from the last frame."""
+        self.unproven = np.zeros(views, bool)
+        """bool (view,): views that have failed below what they showed before, and have not shown people since."""
         self.knocks = KnockedViews(views, body, frame_rate, config)
         """Views that show people beside their places."""
         self.usual = Forgetting((views, 2), frame_rate, config.memory)
@@ -140,13 +143,15 @@ class ViewFailures:
             weight, total = self.recent[0].with_prior(_USUAL_WEIGHT, np.array([1.0, usual]))[k]
             is_low = total / weight < _FAILURE_SHARE * expected
             self.failing[k] = is_low and (self.failing[k] or self._is_significant(k, expected))
+            self.unproven[k] &= is_low or weight < 2 * _USUAL_WEIGHT
+            self.unproven[k] |= self.failing[k] and expected == usual
             if number:
                 self._add_deviations(k, usual)
         self._decide_doubtful(k, is_low)
 
     def _decide_doubtful(self, k: int, is_low: bool) -> None:
         """Count what is doubtful of view k in its usual informedness and deviation, or drop it where the view fails."""
-        if self.failing[k] or self.knocks.knocked[k]:
+        if self.failing[k] or self.unproven[k] or self.knocks.knocked[k]:
             self.doubtful_usual[k] = self.doubtful_deviation[k] = 0.0
             return
         self.usual.forget(k)

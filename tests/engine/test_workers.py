@@ -1,6 +1,7 @@
 """Workers: the same bits on any number of them, and processes that end."""
 
 import os
+import re
 import signal
 import sys
 import threading
@@ -70,11 +71,20 @@ def test_a_worker_that_is_killed_is_replaced(rig_path: Path, undisturbed: Path, 
     assert_same(tmp_path / "run.h5", undisturbed)
 
 
+def test_a_camera_that_is_dead_at_borders_stays_excluded(tmp_path: Path) -> None:
+    rig, boxes = write_recording(tmp_path, 60), tmp_path / "north.csv"
+    boxes.write_text(re.sub(r"(?m)^(1[6-9]|[23]\d|4[0-3]),.*\n", "", boxes.read_text()))
+    for workers in "12":
+        assert track(rig, tmp_path / f"{workers}.h5", "--workers", workers) == 0
+    assert_same(tmp_path / "1.h5", tmp_path / "2.h5")
+    reasons = [row["reason"] for row in stseg.read_run(tmp_path / "1.h5").events if row["kind"] == b"blind"]
+    assert len(reasons) == 2 and reasons[1] == b"camera north counts again, after 27 frames"
+
+
 def test_what_a_worker_finds_wrong_is_one_line(tmp_path: Path, refusal: Command) -> None:
     rig = write_recording(tmp_path)
     boxes = tmp_path / "east.csv"
-    lines = boxes.read_text().splitlines()
-    boxes.write_text("\n".join(line for line in lines if not line.startswith(f"{FRAMES - 1},")) + "\n")
+    boxes.write_text(re.sub(rf"(?m)^{FRAMES - 1},.*\n", "", boxes.read_text()))
     rig.write_text(rig.read_text().replace(f"frames = {FRAMES}", f"frames = {FRAMES - 1}", 1))
     refusal(*run_words(rig, tmp_path / "run.h5", "--workers", "2"))
 

@@ -38,6 +38,7 @@ from stseg.io.untrusted import limits
 from stseg.io.untrusted.safe_hdf5 import open_hdf5, read_whole
 from stseg.io.untrusted.values import EXPECTED_TITLE, abbreviated, is_title, parse_whole
 from stseg.records.cell_reliability import CellCounts, CellReliability, count_cells, doubtful_cells, filled_cells
+from stseg.records.tables import EXCLUDED_VIEW
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -171,6 +172,19 @@ class Run:
     appearance = _TableProperty("APPEARANCE (n,).")
     answers = _TableProperty("ANSWER (n,): answers so far (`stseg correct`).")
     known_people = _TableProperty("KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`).")
+
+    @cached_property
+    def excluded_views(self) -> Rows:
+        """EXCLUDED_VIEW (n,): of a segment alone, before its first and after its last frame."""
+        name = layout.EXCLUDED_VIEWS
+
+        def take(file: h5py.File) -> Rows:
+            if name not in file:
+                return np.zeros(0, EXCLUDED_VIEW)
+            dataset = LayoutChecks(self.path, file).require_dataset(f"/{name}", EXCLUDED_VIEW, 1)
+            return read_whole(dataset, limits.ROWS * EXCLUDED_VIEW.itemsize)
+
+        return require_table(self.bounds, name, read_object(self.path, f"/{name}", take))
 
     @cached_property
     def names(self) -> dict[int, str]:

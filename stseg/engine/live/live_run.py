@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from typing import Self
@@ -18,6 +19,7 @@ from stseg.arrays import Rows
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.live.live_foreground import LiveForegrounds
 from stseg.engine.offline.assembly import FinishedSegment
+from stseg.engine.offline.due_segments import excluded_at_borders
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
@@ -115,6 +117,9 @@ class LiveRun:
         while self._coming is not None and frame_set.frame >= self._coming.lead:
             self._open(self._coming)
             self._coming = next(self._plan, None)
+        for opened, later in pairwise(self._opened):
+            if frame_set.frame == later.segment.first:
+                later.session.follow(opened.session)
         for opened in self._opened:
             self._take(opened, opened.session.add(frame_set), opened.segment.stop)
         if self._opened:
@@ -132,6 +137,10 @@ class LiveRun:
 
     def _open(self, segment: Segment) -> None:
         draft = self._folder.draft(segment.index)
+        if self._opened:
+            segment = replace(segment, excluded=self._opened[-1].session.excluded)
+        elif self.finished:
+            segment = replace(segment, excluded=excluded_at_borders(*self.finished[-1])[1])
         self._opened.append(OpenSegment(self._job, segment, self.pipeline, self.foregrounds.snapshot(), draft))
 
     def _take(self, opened: OpenSegment, steps: list[CommittedFrames], stop: int) -> None:
@@ -210,7 +219,7 @@ class OpenSegment:
         """The segment, and TRAJECTORY rows (n,) of its warm-up."""
         self.names: Names | None = None
         """The run's ids of the segment's tracks; None during the warm-up."""
-        self.session = Session(pipeline, foregrounds, segment.lead, job.read.factors)
+        self.session = Session(pipeline, foregrounds, segment.lead, job.read.factors, segment.border)
         """The stages, by which its frame sets are processed."""
         self._writer = SegmentWriter(job, segment, pipeline.occupancy.views, draft)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []

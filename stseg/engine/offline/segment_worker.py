@@ -1,4 +1,4 @@
-"""Tracking of one segment: frames in, a segment file out. A segment depends on no other segment."""
+"""Tracking of one segment: frames in, a segment file out. Of other segments it knows the views excluded before it."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -46,8 +46,9 @@ class SegmentWorker:
             ExitStack() as threads,
         ):
             packing: Executor | None = None
+            factors, border = job.read.factors, segment.border
             for step in run_session(
-                self.pipeline, foregrounds, frame_sets, segment.lead, fused, self.cores, job.read.factors
+                self.pipeline, foregrounds, frame_sets, segment.lead, fused, self.cores, factors, border
             ):
                 if packing is None and self.cores() > 1:
                     packing = threads.enter_context(ThreadPoolExecutor(1, "packing"))

@@ -14,7 +14,7 @@ from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
 from stseg.geometry.nearest_person import nearest_person
 from stseg.io.config_file import as_toml
-from stseg.io.runfile.layout import ghost_type
+from stseg.io.runfile.layout import EXCLUDED_VIEWS, ghost_type
 from stseg.io.runfile.packed_frames import PackedFrame
 from stseg.io.runfile.run_writer import packed_volume
 from stseg.io.runfile.runs import RunWriter
@@ -64,6 +64,8 @@ class SegmentWriter(ExitStack):
         self._writer = self.enter_context(
             RunWriter(draft, job.recording, views, as_toml(job.config), overwrite=True, kept=job.volume)
         )
+        if len(segment.excluded):
+            self._writer.append(EXCLUDED_VIEWS, segment.excluded)
 
     def write(self, step: CommittedFrames, events: Rows | None = None, executor: Executor | None = None) -> None:
         """Append the next committed frames, with further EVENT rows (k,) of theirs; the last may be packed later.
@@ -95,6 +97,9 @@ class SegmentWriter(ExitStack):
         results, writer = step.results, self._writer
         writer.append("trajectory", step.trajectory)
         writer.append("timings", results.timings)
+        excluded = results.excluded[results.excluded["frame"] == self.segment.stop - 1]
+        if len(excluded):
+            writer.append(EXCLUDED_VIEWS, excluded)
         if results.commit.frames:
             volumes = step.volumes.result()
             writer.append_packed_log_odds(results.frames, [log_odds for log_odds, _ in volumes])

@@ -1,21 +1,22 @@
 """Segmentation of a long recording in time, into parts that are processed independently and written one by one.
 
 A segment is a whole number of windows. Processing begins with a warm-up before its first frame, to initialise the
-tracks, and continues until its last window is solved. The result depends only on the recording and the configuration;
-it is the same after an interrupted run, in another process, and on another machine.
+tracks, and continues until its last window is solved. The result depends on the recording, the configuration and the
+views that are excluded before; it is the same after an interrupted run, in another process, and on another machine.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Ints
+from stseg.arrays import Ints, Rows
 from stseg.config import Config, TrackingConfig
 from stseg.tracking.windows.windows import window_length
+from stseg.view_health.hand_over import NO_EXCLUDED_VIEWS, Border
 
 _SHORTEST = 3
 """Length of a segment over that of the least half of a short recording: a shorter one costs too much warm-up."""
@@ -32,6 +33,13 @@ class Segment:
     first: int
     stop: int
     """Committed frames, half open; those of all segments partition the run except for its gaps."""
+    excluded: Rows = field(default_factory=lambda: NO_EXCLUDED_VIEWS, compare=False, repr=False)
+    """EXCLUDED_VIEW (n,): with which it begins."""
+
+    @property
+    def border(self) -> Border:
+        """Where it continues the one before."""
+        return Border(self.first, self.excluded)
 
 
 def segments(

@@ -5,11 +5,13 @@ returns only the path; the segment of a worker that dies is assigned to another.
 """
 
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from concurrent.futures import CancelledError
 from functools import lru_cache
+from itertools import count
 from pathlib import Path
 
+from stseg.engine.offline.due_segments import DueSegments
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
@@ -17,9 +19,7 @@ from stseg.engine.reporter import Advance
 from stseg.errors import ConfigError, WorkerError
 
 
-def make_by_cluster(
-    job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], address: str, advance: Advance
-) -> Iterator[tuple[Segment, Path]]:
+def make_by_cluster(job: Job, due: DueSegments, draft: Callable[[int], Path], address: str, advance: Advance) -> None:
     """`Workforce.make` by the workers of the scheduler at an address, such as tcp://10.0.0.5:8786.
 
     The folder of the drafts is shared by all of them.
@@ -46,11 +46,17 @@ def make_by_cluster(
     with client:
         name = job.recording.rig.name  # the dashboard shows the part of a key before the first dash as the stage
         shared = client.submit(bytes, pickle.dumps(job), pure=False)  # a result is made anew, scattered bytes are not
-        futures = {}
-        for segment in missing:
-            path, key = draft(segment.index).absolute(), f"segment-{name}-{segment.index:05}"
-            futures[client.submit(make_segment, shared, segment, path, key=key, pure=False)] = segment
-        for future in as_completed(futures):
+        futures, waiting, number = {}, as_completed(), count()
+
+        def submit() -> None:
+            while segment := due.next(advance):
+                path, key = draft(segment.index).absolute(), f"segment-{name}-{segment.index:05}-{next(number)}"
+                future = client.submit(make_segment, shared, segment, path, key=key, pure=False)
+                futures[future] = segment
+                waiting.add(future)
+
+        submit()
+        for future in waiting:
             segment = futures.pop(future)  # released: its file exists, so it is not recomputed if its worker dies
             try:
                 path = future.result()
@@ -58,7 +64,8 @@ def make_by_cluster(
                 frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
                 raise WorkerError("--scheduler", frames, str(error), "workers that stay alive") from error
             advance(segment.stop - segment.first)
-            yield segment, path
+            due.keep(segment, path)
+            submit()
 
 
 def make_segment(job: bytes, segment: Segment, draft: Path) -> Path:

@@ -7,13 +7,14 @@ assigned to another. The last to work share the cores of those that have nothing
 import os
 import signal
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from stseg.engine.offline.due_segments import DueSegments
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
@@ -44,8 +45,8 @@ class _Worker:
 
 
 def make_by_workers(
-    job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], workers: int, advance: Advance, note: Note
-) -> Iterator[tuple[Segment, Path]]:
+    job: Job, due: DueSegments, draft: Callable[[int], Path], workers: int, advance: Advance, note: Note
+) -> None:
     """`Workforce.make` by that many worker processes.
 
     Raises
@@ -55,15 +56,10 @@ def make_by_workers(
     StsegError
         An error raised by a worker.
     """
-    pending, tries, notes = list(missing)[::-1], Counter[int](), set[str]()
-    number = min(workers, len(missing))
-    with _pool(job, number) as pool:
-        while pending or any(worker.segment for worker in pool):
-            for worker in pool:
-                if worker.segment is None and pending:
-                    worker.segment = pending.pop()
-                    worker.send((worker.segment, draft(worker.segment.index)))
-            _share_cores([worker for worker in pool if worker.segment])
+    tries, notes = Counter[int](), set[str]()
+    with _pool(job, workers) as pool:
+        while busy := _busy(pool, due, draft, advance):
+            _share_cores(busy)
             for worker in _ready(pool):
                 message = _receive(worker)
                 segment = worker.segment
@@ -75,7 +71,7 @@ def make_by_workers(
                     notes.add(message)
                 elif isinstance(message, Path) and segment is not None:
                     worker.segment = None
-                    yield segment, message
+                    due.keep(segment, message)
                 elif isinstance(message, BaseException):
                     raise message
                 else:
@@ -83,8 +79,17 @@ def make_by_workers(
                     if segment is not None:
                         tries[segment.index] += 1
                         _limit_tries(segment, tries[segment.index], worker)
-                        pending.append(segment)
+                        due.lose(segment)
                         pool.append(_start(job, worker.cores))
+
+
+def _busy(pool: list[_Worker], due: DueSegments, draft: Callable[[int], Path], advance: Advance) -> list[_Worker]:
+    """Give the workers that have none a segment each, as far as some are due; the workers that have one."""
+    for worker in pool:
+        if worker.segment is None and (segment := due.next(advance)):
+            worker.segment = segment
+            worker.send((segment, draft(segment.index)))
+    return [worker for worker in pool if worker.segment]
 
 
 def _share_cores(busy: list[_Worker]) -> None:

@@ -1,6 +1,6 @@
 """The processes that make segments: this one, several of this machine, or the workers of a Dask scheduler."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import current_process
@@ -8,9 +8,9 @@ from pathlib import Path
 
 from stseg.engine.memory import process_memory
 from stseg.engine.offline.calls import Caller, called_beside, called_here
+from stseg.engine.offline.due_segments import DueSegments
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
-from stseg.engine.offline.segments import Segment
 from stseg.engine.reporter import Advance, Note
 from stseg.engine.workers.cluster import make_by_cluster
 from stseg.engine.workers.local_workers import make_by_workers
@@ -54,14 +54,12 @@ class Workforce:
         several = self.scheduler is None and self.processes(job) > 1
         return partial(called_beside, note) if several and FORKED else called_here
 
-    def make(
-        self, job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], advance: Advance, note: Note
-    ) -> Iterator[tuple[Segment, Path]]:
-        """Segments and their files, in the order in which they are finished.
+    def make(self, job: Job, due: DueSegments, draft: Callable[[int], Path], advance: Advance, note: Note) -> None:
+        """Make segments until none is due.
 
         Parameters
         ----------
-        job, missing
+        job, due
             The run, and its segments that are to be made.
         draft
             Gives the path of a segment's unfinished file from its index.
@@ -70,14 +68,14 @@ class Workforce:
         note
             Called with lines about the work.
         """
-        if not missing:
+        if not (number := len(due)):
             return
-        workers = min(len(missing), self.processes(job))
+        workers = min(number, self.processes(job))
         if self.scheduler is not None:
-            yield from make_by_cluster(job, missing, draft, self.scheduler, advance)
+            make_by_cluster(job, due, draft, self.scheduler, advance)
         elif workers > 1:
-            yield from make_by_workers(job, missing, draft, workers, advance, note)
+            make_by_workers(job, due, draft, workers, advance, note)
         else:
             worker = SegmentWorker(job, free_cores)
-            for segment in missing:
-                yield segment, worker.make(segment, draft(segment.index), advance)
+            while segment := due.next(advance):
+                due.keep(segment, worker.make(segment, draft(segment.index), advance))
