@@ -8,7 +8,7 @@ plane, `pixel` is image coordinates, `cell` is an index into the grid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -92,6 +92,14 @@ class Boxes:
         """A subset, by index, mask or slice."""
         features = None if self.features is None else self.features[chosen]
         return Boxes(self.pixel[chosen], self.score[chosen], features)
+
+
+@dataclass(frozen=True, slots=True)
+class AlignedBoxes(Boxes):
+    """Boxes that were moved to where the other views see their people."""
+
+    right: Floats = field(default_factory=lambda: np.zeros(0))
+    """float64 (n,): how far to the right, pixels."""
 
 
 Observation = Bytes | NDArray[np.uint16] | Singles | Boxes | None

@@ -151,8 +151,7 @@ class BoxNoise:
     tolerances. By the first guess, in which standard deviations grow with one over the root of the score, that is the
     logarithm of the score.
 
-    The first guess is also the loosest: what fits worse than that is no error of edges but a box of another person. And
-    the width is not learned: arms and strides change it, from frame to frame together, however sharp the detector is.
+    The width is not learned: arms and strides change it, from frame to frame together, however sharp the detector is.
     """
 
     spread: Floats

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Boxes, Flags, Floats, Ints, Shorts, Singles
+from stseg.arrays import AlignedBoxes, Boxes, Flags, Floats, Ints, Shorts, Singles
 from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, ViewBoxes, fill_inside
 from stseg.bodies.outlines import Pillars, Spans, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex
@@ -38,6 +38,8 @@ class ViewObservation:
     """float64 (box,): see `stseg.bodies.box_fit`."""
     raster: Singles
     """float32 (v, u): log-odds of foreground, nats."""
+    right: Floats | float = 0.0
+    """float64 (box,), or one for all: how far boxes were moved to the right (`AlignedBoxes`), pixels."""
 
     @cached_property
     def is_foreground(self) -> Flags:
@@ -152,7 +154,8 @@ class BoxView(View):
         width, height = self.camera.size
         corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
-        return ViewObservation(edges, boxes.score, *noise.of(boxes.score), np.zeros((0, 0), np.float32))
+        right = boxes.right if isinstance(boxes, AlignedBoxes) else 0.0
+        return ViewObservation(edges, boxes.score, *noise.of(boxes.score), np.zeros((0, 0), np.float32), right)
 
     def boxes(self, observation: ViewObservation) -> ViewBoxes:
         """The frame's boxes, as kernels read them."""

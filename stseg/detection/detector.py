@@ -96,7 +96,7 @@ class Detector:
         number, rate, error_rates = len(self.views), self._frame_rate, self._error_rates
         return Estimates(
             BoxNoiseEstimate(rate, error_rates, self.body.stoutness),
-            BoxBiasEstimate(rate, error_rates),
+            BoxBiasEstimate(number, rate, error_rates),
             PopulationEstimate(self.body, rate, error_rates),
             RimEstimate(number, self.body, self.config, rate, error_rates),
             ViewFailures(number, self.body, rate, error_rates),

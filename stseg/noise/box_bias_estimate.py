@@ -1,38 +1,38 @@
-"""Mean error of the lower edges of a detector's boxes, learned from people who stand free.
+"""Mean errors of boxes (`stseg.noise.box_bias`), learned from people who stand free.
 
-A detector's boxes may end below the feet (amodal boxes, shadows) or above them. The offset d of a box's lower edge from
-the feet, in shares of the body's height in the image, is known where other edges show where the person stands. The
-place is not known without them: with the bias m and a place that is off by e, the offsets of lower edges and of the
-boxes' middles from those of a body at the estimated place are
+Other edges of the same person show where an edge should be. The place is not known without them: with a place that is
+off by e, the offsets of lower edges and of middles of boxes from a body of h pixels at the estimated place are
 
-    d_k = m - J_k e + noise,    c_k = -K_k e + noise,
+    d_k = m - J_k e + noise,    c_k = s_k / h - K_k e + noise,
 
-with derivatives J, K by the place and equal noise. Least squares without e leave an information i, boxes, and i m of
-each person (Schur complement): 0 for one view, or for views that look the same way. Over all people and frames
+with derivatives J, K by the place and equal noise. Least squares without e leave normal equations of m and b (Schur
+complement), which say nothing by one view, or by views that look the same way. Equations of all people and frames add
+up, in seconds of one person, forgotten as all that is learned (`stseg.records.forgetting`). Boxes are corrected before
+they are observed, and offsets are those of boxes as they were delivered.
 
-    m = sum i m / (sum i + w_0),
-
-in seconds of one person, forgotten as all that is learned (`stseg.records.forgetting`). Boxes are corrected before they
-are observed, and offsets are those of boxes as they were delivered.
-
-All views have one mean: what differs between them cannot be told from a ground that moved, and the mean errors of heads
-cannot be told from taller people.
+All views have one m: what differs between them cannot be told from a ground that moved. The mean errors of heads cannot
+be told from taller people.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Boxes, Floats, ViewEvidence
-from stseg.bodies.box_fit import EDGE_GRAIN, LOWER_EDGE_BELOW, MIDDLE_OFFSET, fill_offsets
+from stseg.arrays import Floats, Ints, ViewEvidence
+from stseg.bodies.box_fit import EDGE_GRAIN, LEAST_PIXEL_HEIGHT, MIDDLE_OFFSET, fill_offsets
 from stseg.bodies.views import View, ViewObservations
 from stseg.config import ErrorRateConfig
-from stseg.noise.box_noise_estimate import explained_boxes, whole_boxes
+from stseg.noise.box_bias import SHIFT_TERMS, BoxBias, shift_terms
+from stseg.noise.box_noise_estimate import explained_boxes
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation
 
 _PRIOR_WEIGHT = 2.0
-"""w_0, weight of no error, seconds of one box: the errors of one box last for a second, and are as large."""
+"""Weight of no error, seconds of one box: the errors of one box last for a second, and are as large."""
+_NOISE, _SHIFT_ERROR = 0.03, 0.01
+"""Standard deviations: of a middle, shares of a body's height, and of the terms of a shift, shares of the image's
+width: of views placed by hand, or with a lens that was taken for straight."""
 _FREE_SHARE = 0.95
 """Least share of a whole body's detection rate where it stands free, 0..1."""
 _LARGEST_OFFSET = 0.15
@@ -44,79 +44,101 @@ _LEAST_INFORMATION = 1e-6
 """Information on a place without boxes, per square metre."""
 
 
+class _Offsets(NamedTuple):
+    """Offsets of edges from the bodies of their people."""
+
+    person: Ints
+    """int64 (n,)."""
+    by_error: Floats
+    """float64 (n, error): their change by m and all b."""
+    by_place: Floats
+    """float64 (n, 2): by metres in x and y."""
+    offset: Floats
+    """float64 (n,): of boxes as they were delivered, shares of the height."""
+
+
 class BoxBiasEstimate:
-    """Accumulated offsets of lower edges.
+    """Accumulated normal equations.
 
     Parameters
     ----------
+    views
+        Number of views.
     frame_rate
         Frames per second.
     config
         How fast is forgotten, and from which evidence on people count.
     """
 
-    def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
-        self._config = config
-        self.offsets = Forgetting((2,), frame_rate, config.memory)
-        """(2,): information, boxes, and the bias times it, shares of the height; both times seconds."""
-        self._corrected = 0.0
+    def __init__(self, views: int, frame_rate: float, config: ErrorRateConfig) -> None:
+        self._config, size = config, 1 + SHIFT_TERMS * views
+        self.equations = Forgetting((size, size + 1), frame_rate, config.memory)
+        """(error, error + 1): information on m and b, and what it says of them; both times seconds."""
+        self._prior = np.full(size, (_NOISE / _SHIFT_ERROR) ** 2)
+        self._prior[0] = _PRIOR_WEIGHT
+        self._corrected = np.zeros(size)
 
     @property
-    def bias(self) -> float:
-        """Mean offset by all frames so far, shares of the height: below 0 where boxes end below the feet."""
-        weight, offset = self.offsets.sums.tolist()
-        return float(offset / (weight + _PRIOR_WEIGHT))
+    def bias(self) -> BoxBias:
+        """Mean errors by all frames so far."""
+        errors = self._errors
+        return BoxBias(float(errors[0]), errors[1:].reshape(-1, SHIFT_TERMS))
+
+    @property
+    def _errors(self) -> Floats:
+        sums = self.equations.sums
+        return np.asarray(np.linalg.solve(sums[:, :-1] + np.diag(self._prior), sums[:, -1]))
 
     def corrected(self, evidence: Sequence[ViewEvidence], sizes: Sequence[tuple[int, int]]) -> list[ViewEvidence]:
-        """The evidence of the next frame, in images of sizes (width, height), with boxes that end at the feet."""
-        bias = self._corrected = self.bias
-        pairs = zip(evidence, sizes, strict=True)
-        return [_corrected(view, bias, size) if isinstance(view, Boxes) else view for view, size in pairs]
+        """The evidence of the next frame by the mean errors so far; see `BoxBias.corrected`."""
+        self._corrected = self._errors
+        return self.bias.corrected(evidence, sizes)
 
     def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count the frame whose boxes were corrected last."""
-        self.offsets.forget()
-        people = explanation.people
-        information, sums = np.zeros((len(people), 3, 3)), np.zeros((len(people), 3))
-        for k, person, observation, box in explained_boxes(explanation, views, observations, self._config):
-            edges = observation.edges[box]
-            middle, lower = _linear_offsets(views[k], people.ground[person], people.height[person], edges)
-            lower[:, 0] += self._corrected
-            free = people.found_share[k, person] >= _FREE_SHARE
-            counted = free & (np.abs(lower[:, 0]) < _LARGEST_OFFSET)
-            for offset, share in ((lower, 1.0), (middle, 0.0)):
-                row = np.column_stack([np.full(len(person), share), -offset[:, 1:]])
-                np.add.at(information, person[counted], (row[:, :, None] * row[:, None])[counted])
-                np.add.at(sums, person[counted], (row * offset[:, :1])[counted])
-        self.offsets.add(self.offsets.seconds(_without_places(information, sums)))
+        self.equations.forget()
+        offsets = [
+            self._offsets(k, views[k], explanation, person, observation.edges[box])
+            for k, person, observation, box in explained_boxes(explanation, views, observations, self._config)
+        ]
+        if offsets:
+            every = _Offsets(*map(np.concatenate, zip(*offsets, strict=True)))
+            self.equations.add(self.equations.seconds(_without_places(every, len(explanation.people))))
+
+    def _offsets(self, k: int, view: View, explanation: Explanation, person: Ints, edges: Floats) -> _Offsets:
+        """Lower edges and middles of view k, of people who stand free in it, edges (n, 4)."""
+        people, size = explanation.people, len(self._prior)
+        middle, lower, tall = _linear_offsets(view, people.ground[person], people.height[person], edges)
+        by_error = np.zeros((2, len(person), size))
+        by_error[0, :, 0] = 1.0
+        by_error[1, :, 1 + SHIFT_TERMS * k :][:, :SHIFT_TERMS] = shift_terms(edges, view.camera.size) / tall[:, None]
+        offset = np.stack([lower[:, 0], middle[:, 0]]) + by_error @ self._corrected
+        free = people.found_share[k, person] >= _FREE_SHARE
+        free &= (np.abs(offset) < _LARGEST_OFFSET).all(0)
+        by_place = -np.stack([lower[:, 1:], middle[:, 1:]])[:, free]
+        found = by_error[:, free].reshape(-1, size), by_place.reshape(-1, 2), offset[:, free].ravel()
+        return _Offsets(np.tile(person[free], 2), *found)
 
 
-def _linear_offsets(view: View, ground: Floats, height: Floats, edges: Floats) -> tuple[Floats, Floats]:
-    """Offsets of the middles and lower edges of boxes, edges (n, 4), and their change by metres in x and y: (n, 3)."""
+def _linear_offsets(view: View, ground: Floats, height: Floats, edges: Floats) -> tuple[Floats, Floats, Floats]:
+    """Offsets of middles and of lower edges (n, 4) and their change by metres in x and y, (n, 3); heights, pixels."""
     width, image_height = map(float, view.camera.size)
     found = np.empty((3, len(edges), 4))
-    for offsets, difference in zip(found, _DIFFERENCES, strict=True):
-        fill_offsets(view.table.boxes_of(ground + difference, height), edges, width, image_height, offsets)
+    bodies = [view.table.boxes_of(ground + difference, height) for difference in _DIFFERENCES]
+    for offsets, body in zip(found, bodies, strict=True):
+        fill_offsets(body, edges, width, image_height, offsets)
+    tall = np.fmax(bodies[0][:, 3] - bodies[0][:, 1], LEAST_PIXEL_HEIGHT) + EDGE_GRAIN[MIDDLE_OFFSET]
     found[1:] = (found[1:] - found[0]) / _DIFFERENCE
     found = np.nan_to_num(found)
-    return found[:, :, MIDDLE_OFFSET].T.copy(), found[:, :, -1].T.copy()
+    return found[:, :, MIDDLE_OFFSET].T, found[:, :, -1].T, tall
 
 
-def _without_places(information: Floats, sums: Floats) -> Floats:
-    """Information on the bias, boxes, and the bias times it, from all people: their places are not known, float64 (2,).
-
-    `information` (n, 3, 3) and `sums` (n, 3) are of the bias and of the place of each person, by equally sharp edges.
-    """
-    of_places = information[:, 1:, 1:] + _LEAST_INFORMATION * np.eye(2)
-    gain = np.linalg.solve(of_places, information[:, 1:, :1])[:, :, 0]
-    share = information[:, 0, 0] - (information[:, 0, 1:] * gain).sum(1)
-    return np.array([share.sum(), (sums[:, 0] - (sums[:, 1:] * gain).sum(1)).sum()])
-
-
-def _corrected(boxes: Boxes, bias: float, size: tuple[int, int]) -> Boxes:
-    """The boxes, the lower edges moved by a bias where no border of the image cuts the box."""
-    edges, tall = boxes.pixel.copy(), boxes.pixel[:, 3]
-    edges[:, 2:] += edges[:, :2]
-    moved = np.maximum(tall + bias * (tall + EDGE_GRAIN[LOWER_EDGE_BELOW]), 1.0)
-    height = np.where(whole_boxes(edges, size), moved, tall)
-    return Boxes(np.column_stack([boxes.pixel[:, :3], height]), boxes.score, boxes.features)
+def _without_places(offsets: _Offsets, people: int) -> Floats:
+    """Normal equations of the errors, float64 (error, error + 1), of people whose places are not known."""
+    person, by_error, by_place, offset = offsets
+    equations = np.column_stack([by_error, offset])
+    of_places, both = np.zeros((people, 2, 2)), np.zeros((people, 2, equations.shape[1]))
+    np.add.at(of_places, person, by_place[:, :, None] * by_place[:, None])
+    np.add.at(both, person, by_place[:, :, None] * equations[:, None])
+    known = np.linalg.solve(of_places + _LEAST_INFORMATION * np.eye(2), both)
+    return np.asarray(by_error.T @ equations - np.einsum("npi,npj->ij", both[:, :, :-1], known))

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Floats, Ints
 from stseg.bodies.box_fit import (
     LOWER_EDGE_ABOVE,
     LOWER_EDGE_BELOW,
@@ -35,6 +35,7 @@ from stseg.bodies.box_fit import (
 )
 from stseg.bodies.views import BoxView, View, ViewObservation, ViewObservations
 from stseg.config import ErrorRateConfig
+from stseg.noise.box_bias import whole_boxes
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation, People
 
@@ -73,7 +74,7 @@ class BoxNoiseEstimate:
         both = freedom[:, _LOWER_EDGE].sum(1, keepdims=True)
         spread[:, _LOWER_EDGE] = root * np.sqrt(root.sum(1, keepdims=True) / both)
         spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
-        return BoxNoise(np.minimum(spread, PRIOR_NOISE.spread), self._scale)
+        return BoxNoise(spread, self._scale)
 
     def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count one frame."""
@@ -99,11 +100,6 @@ def explained_boxes(
             supported = people.supported_without(k, config.minimum_evidence)
             box = np.flatnonzero((owner >= 0) & supported[owner] & whole_boxes(observation.edges, view.camera.size))
             yield k, owner[box], observation, box
-
-
-def whole_boxes(edges: Floats, size: tuple[int, int]) -> Flags:
-    """Boxes float64 (n, 4) of edges that the border of an image (width, height) does not cut."""
-    return np.asarray((edges[:, :2] > 0).all(1) & (edges[:, 2:] < np.array(size) - 1).all(1))
 
 
 def _counted(view: View, people: People, person: Ints, edges: Floats, tolerance: Floats) -> Floats:

@@ -2,8 +2,8 @@
 
 They are small for all views of a sound rig, and a knocked camera shows in its first frame. A view measures places well
 across its line of sight. People at a distance from all others in it are located along that direction by this view alone
-and compared with their places by all views. The mean of one frame is rough, the median over minutes good to a
-centimetre or two.
+and compared with their places by all views; boxes count as they were delivered, before any alignment. The mean of one
+frame is rough, the median over minutes good to a centimetre or two.
 """
 
 from collections.abc import Sequence
@@ -73,11 +73,11 @@ def _of_view(people: Candidates, view: DetectorView, observation: ViewObservatio
     if isinstance(view, PixelView):
         found[separate] = _by_pixels(people.at(separate), right[separate], view, observation)
         return found
+    delivered = _middles(observation.edges)[:, 0] - observation.right
     for j in separate:
         if len(boxes_of_person := np.flatnonzero(owner == j)):
             middles = [float(end[j, 0] + end[j, 2]) / 2 for end in ends]
-            middle = float(observation.edges[boxes_of_person[0], 0] + observation.edges[boxes_of_person[0], 2]) / 2
-            found[j] = np.interp(middle, middles, shifts)
+            found[j] = np.interp(delivered[boxes_of_person[0]], middles, shifts)
     return found
 
 
