@@ -228,5 +228,6 @@ class Detector:
             np.zeros(0, np.int64) if o is None else nearest_people(bodies, view, o)
             for view, o in zip(self.views, of_excluded, strict=True)
         ]
-        residual = reprojection_residuals(bodies, self.views, of_excluded, owners)
+        free = np.zeros((len(self.views), len(bodies)), bool)
+        residual = reprojection_residuals(bodies, self.views, of_excluded, owners, free)
         return replace(explanation, residual=np.where(excluded, residual, explanation.residual))

@@ -26,7 +26,9 @@ def explained_frame(estimate: MapEstimate) -> Explanation:
     estimate = estimate if observed.all() else estimate.with_members(estimate.members[observed])
     explanation = explained_by(estimate, refined_members(estimate))
     people, evidence = explanation.people, estimate.evidence
-    residual = reprojection_residuals(people.candidates, evidence.views, evidence.observations, estimate.box_assignment)
+    residual = reprojection_residuals(
+        people.candidates, evidence.views, evidence.observations, estimate.box_assignment, people.is_free
+    )
     return replace(explanation, residual=residual)
 
 

@@ -33,8 +33,6 @@ _PRIOR_WEIGHT = 2.0
 _NOISE, _SHIFT_ERROR = 0.03, 0.01
 """Standard deviations: of a middle, shares of a body's height, and of the terms of a shift, shares of the image's
 width: of views placed by hand, or with a lens that was taken for straight."""
-_FREE_SHARE = 0.95
-"""Least share of a whole body's detection rate where it stands free, 0..1."""
 _LARGEST_OFFSET = 0.15
 """Largest offset that is an error and not the box of another body: 2.5 standard deviations, shares of the height."""
 _DIFFERENCE = 0.05
@@ -113,8 +111,7 @@ class BoxBiasEstimate:
         by_error[0, :, 0] = 1.0
         by_error[1, :, 1 + SHIFT_TERMS * k :][:, :SHIFT_TERMS] = shift_terms(edges, view.camera.size) / tall[:, None]
         offset = np.stack([lower[:, 0], middle[:, 0]]) + by_error @ self._corrected
-        free = people.found_share[k, person] >= _FREE_SHARE
-        free &= (np.abs(offset) < _LARGEST_OFFSET).all(0)
+        free = people.is_free[k, person] & (np.abs(offset) < _LARGEST_OFFSET).all(0)
         by_place = -np.stack([lower[:, 1:], middle[:, 1:]])[:, free]
         found = by_error[:, free].reshape(-1, size), by_place.reshape(-1, 2), offset[:, free].ravel()
         return _Offsets(np.tile(person[free], 2), *found)

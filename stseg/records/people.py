@@ -15,6 +15,10 @@ SAME_PLACE = 0.2
 """Distance below which people of two readings of a frame are one, metres."""
 
 
+_FREE_SHARE = 0.95
+"""Least share of a whole body's detection rate where it stands free, 0..1."""
+
+
 @dataclass(frozen=True)
 class People:
     """Candidates with places, sizes and evidence: people, or ghosts."""
@@ -48,6 +52,11 @@ class People:
     def candidates(self) -> Candidates:
         """Their places and sizes."""
         return Candidates(self.ground, self.height, self.width)
+
+    @property
+    def is_free(self) -> Flags:
+        """bool (view, n): those whom a view of boxes finds as it finds whole bodies."""
+        return np.asarray(self.found_share >= _FREE_SHARE)
 
     def supported_without(self, view: int, least: float) -> Flags:
         """Those for whom all evidence but one view's is some nats at least, bool (n,)."""

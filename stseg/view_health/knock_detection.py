@@ -76,8 +76,10 @@ def _step(agreement: Floats, view: int, least: float) -> Knock | None:
     drop = float(np.median(relative[rows][:cut]) - np.median(relative[rows][cut:]))
     if errors < _STEP_ERRORS or step < _STEP_DEVIATIONS * spread or drop < least:
         return None
-    score = agreement[rows, view]
-    return Knock(view, int(rows[cut]), float(np.median(score[:cut])), float(np.median(score[cut:])), float(errors))
+    sound, low = (float(np.median(part)) for part in np.split(agreement[rows, view], [cut]))
+    if sound - low < drop / 2:  # rather, the others have risen
+        return None
+    return Knock(view, int(rows[cut]), sound, low, float(errors))
 
 
 def _cut(values: Floats) -> int:

@@ -1,8 +1,9 @@
 """Reprojection residuals: how far beside their places each view sees people.
 
 They are small for all views of a sound rig, and a knocked camera shows in its first frame. A view measures places well
-across its line of sight. People at a distance from all others in it are located along that direction by this view alone
-and compared with their places by all views; boxes count as they were delivered, before any alignment. The mean of one
+across its line of sight. People at a distance from all others in it, and boxes of people who stand free, are located
+along that direction by this view alone and compared with their places by all views; boxes count as they were delivered,
+before any alignment. The mean of one
 frame is rough, the median over minutes good to a centimetre or two.
 """
 
@@ -20,7 +21,11 @@ _SHIFTS = np.arange(-_GREATEST_RESIDUAL, _GREATEST_RESIDUAL + _RESIDUAL_STEP / 2
 
 
 def reprojection_residuals(
-    people: Candidates, views: Sequence[DetectorView], observations: ViewObservations, boxes: list[Ints]
+    people: Candidates,
+    views: Sequence[DetectorView],
+    observations: ViewObservations,
+    boxes: list[Ints],
+    free: Flags,
 ) -> Floats:
     """Mean residual of each view.
 
@@ -32,16 +37,18 @@ def reprojection_residuals(
         The views, and the observation of each; None where blind.
     boxes : int64 (box,) each
         For each view the person of each box by assignment, -1 for none.
+    free : bool (view, n)
+        Whether a person's box counts although the person overlaps others.
 
     Returns
     -------
     float64 (view,)
-        Mean over people who overlap no others, metres, positive to the right of the view; nan where there are none.
+        Mean over people who overlap no others, or are free, metres, positive to the right of the view; nan for none.
     """
     measured = np.full(len(views), np.nan)
     for k, (view, observation, owner) in enumerate(zip(views, observations, boxes, strict=True)):
         if observation is not None and len(people):
-            found = _of_view(people, view, observation, owner)
+            found = _of_view(people, view, observation, owner, free[k])
             if np.isfinite(found).any():
                 measured[k] = np.nanmean(found)
     return measured
@@ -63,18 +70,19 @@ def _middles(edges: Floats) -> Floats:
     return (edges[:, :2] + edges[:, 2:]) / 2
 
 
-def _of_view(people: Candidates, view: DetectorView, observation: ViewObservation, owner: Ints) -> Floats:
-    """Residual of each person, float64 (n,), metres; nan for those that overlap others."""
+def _of_view(people: Candidates, view: DetectorView, observation: ViewObservation, owner: Ints, free: Flags) -> Floats:
+    """Residual of each person, float64 (n,), metres; nan for those that overlap others and are not free."""
     found = np.full(len(people), np.nan)
     right = _right(people.ground, view)
     shifts = (-_GREATEST_RESIDUAL, 0.0, _GREATEST_RESIDUAL)
     ends = [view.table.boxes_of(people.ground + shift * right, people.height) for shift in shifts]
-    separate = np.flatnonzero(_is_separate(np.stack(ends), view))
+    is_separate = _is_separate(np.stack(ends), view)
     if isinstance(view, PixelView):
+        separate = np.flatnonzero(is_separate)
         found[separate] = _by_pixels(people.at(separate), right[separate], view, observation)
         return found
     delivered = _middles(observation.edges)[:, 0] - observation.right
-    for j in separate:
+    for j in np.flatnonzero(is_separate | (free & np.isfinite(ends).all((0, 2)))):
         if len(boxes_of_person := np.flatnonzero(owner == j)):
             middles = [float(end[j, 0] + end[j, 2]) / 2 for end in ends]
             found[j] = np.interp(delivered[boxes_of_person[0]], middles, shifts)
