@@ -104,11 +104,12 @@ def test_places_are_as_sure_as_they_are_right(views: int) -> None:
 
 
 def test_boxes_of_a_view_that_is_turned_move_to_their_people() -> None:
-    """The residual is still that of the boxes as they were delivered."""
+    """The residual is still that of the boxes as they were delivered, and of people who are close to each other."""
     frame_pass, estimate, rng = detector_of(room(), "boxes"), BoxBiasEstimate(4, RATE, CONFIG), np.random.default_rng(0)
     sizes, found = [view.camera.size for view in frame_pass.views], []
     for _ in range(150):
-        seen = shaken_boxes(frame_pass, people(tuple(rng.uniform(-1, 1, 2))), 0.01, 1.0, rng)
+        x, y = rng.uniform(-0.8, 0.8, 2)
+        seen = shaken_boxes(frame_pass, people((x - 0.25, y), (x + 0.25, y)), 0.01, 1.0, rng)
         seen[1].pixel[:, 0] -= 0.02 * sizes[1][0]
         corrected = estimate.corrected(seen, sizes)
         explanation, observed = frame_pass.explain(corrected, None), frame_pass.observe(corrected)
