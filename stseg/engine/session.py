@@ -40,7 +40,7 @@ from stseg.trackers.alternative_tracks import AlternativeTracks
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.rows import fill_views
 from stseg.view_health.blind_views import ExcludedViews, FrozenViews
-from stseg.view_health.hand_over import NO_BORDER, Border, excluded_rows, take_over
+from stseg.view_health.hand_over import NOTHING_BEFORE, SegmentStart, excluded_rows, take_over
 from stseg.view_health.image_shifts import image_shifts, shift_is_due
 
 _AHEAD = 2
@@ -62,7 +62,7 @@ class Session:
         Number of the first frame.
     factors
         Reduction factor of each camera's images, whose shifts are measured then; None to measure none.
-    border
+    start
         Where it continues a segment before.
     """
 
@@ -72,16 +72,16 @@ class Session:
         foregrounds: Sequence[ViewForeground],
         first: int,
         factors: Sequence[int] | None = None,
-        border: Border = NO_BORDER,
+        start: SegmentStart = NOTHING_BEFORE,
     ) -> None:
         self.pipeline, self.foregrounds, self.watch = pipeline, foregrounds, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         cameras = [camera.name for camera in pipeline.rig.cameras]
         self._frozen = FrozenViews(len(cameras), pipeline.rig.frame_rate)
-        self._excluded = ExcludedViews(cameras, border)
+        self._excluded = ExcludedViews(cameras, start)
         self._estimates = pipeline.detector.new_estimates()
-        take_over(self._estimates.failures, border.excluded)
-        self.excluded = border.excluded
+        take_over(self._estimates.failures, start.excluded)
+        self.excluded = start.excluded
         """EXCLUDED_VIEW (n,): after the last frame."""
         self._error_rates = pipeline.occupancy.new_error_rates()
         self._records: dict[int, FrameRecord] = {}
@@ -208,7 +208,7 @@ def run_session(
     advance: Advance,
     cores: Callable[[], int] = two_cores,
     factors: Sequence[int] | None = None,
-    border: Border = NO_BORDER,
+    start: SegmentStart = NOTHING_BEFORE,
 ) -> Iterator[CommittedFrames]:
     """The results of frame sets, in the order of time, in a `Session` of their own, each as soon as it is decided.
 
@@ -216,7 +216,7 @@ def run_session(
     session has from the next frame on; with one it has no threads but those that decode.
     """
     with ExitStack() as threads:
-        session = Session(pipeline, foregrounds, first, factors, border)
+        session = Session(pipeline, foregrounds, first, factors, start)
         for frame_set, evidence in _prepared(session, iter(frame_sets), cores, threads):
             yield from session.add(frame_set, evidence)
             advance(frame_set.frame)

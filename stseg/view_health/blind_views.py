@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Observation, Rows, ViewEvidence
 from stseg.records.tables import EVENT, reason_of
-from stseg.view_health.hand_over import Border
+from stseg.view_health.hand_over import SegmentStart
 from stseg.view_health.view_failures import ViewFailures
 
 _NO_EVIDENCE = "is frozen, or its light changes: excluded"
@@ -24,13 +24,13 @@ class ExcludedViews:
     ----------
     cameras
         Their names.
-    border
+    start
         What was excluded before, and the first frame of which there are events.
     """
 
-    def __init__(self, cameras: Sequence[str], border: Border) -> None:
-        self._cameras, self._first = cameras, border.first
-        since = dict(zip(border.excluded["view"].tolist(), border.excluded["since"].tolist(), strict=True))
+    def __init__(self, cameras: Sequence[str], start: SegmentStart) -> None:
+        self._cameras, self._first = cameras, start.first
+        since = dict(zip(start.excluded["view"].tolist(), start.excluded["since"].tolist(), strict=True))
         self.since = [None if since.get(k, -1) < 0 else since[k] for k in range(len(cameras))]
         """First frame from which each view is excluded; None where it counts."""
 

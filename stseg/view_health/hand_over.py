@@ -18,7 +18,7 @@ _RECENT_TIME = 1.0
 """Time of one person for which a failed view is taken to have shown nothing before a segment, seconds."""
 
 
-class Border(NamedTuple):
+class SegmentStart(NamedTuple):
     """Where a segment continues the one before."""
 
     first: int = 0
@@ -27,7 +27,7 @@ class Border(NamedTuple):
     """EXCLUDED_VIEW (n,): after the frame before."""
 
 
-NO_BORDER = Border()
+NOTHING_BEFORE = SegmentStart()
 
 
 def excluded_rows(frame: int, failures: ViewFailures, since: Sequence[int | None]) -> Rows:

@@ -219,7 +219,7 @@ class OpenSegment:
         """The segment, and TRAJECTORY rows (n,) of its warm-up."""
         self.names: Names | None = None
         """The run's ids of the segment's tracks; None during the warm-up."""
-        self.session = Session(pipeline, foregrounds, segment.lead, job.read.factors, segment.border)
+        self.session = Session(pipeline, foregrounds, segment.lead, job.read.factors, segment.start)
         """The stages, by which its frame sets are processed."""
         self._writer = SegmentWriter(job, segment, pipeline.occupancy.views, draft)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []

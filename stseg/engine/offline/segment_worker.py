@@ -46,9 +46,9 @@ class SegmentWorker:
             ExitStack() as threads,
         ):
             packing: Executor | None = None
-            factors, border = job.read.factors, segment.border
+            factors, start = job.read.factors, segment.start
             for step in run_session(
-                self.pipeline, foregrounds, frame_sets, segment.lead, fused, self.cores, factors, border
+                self.pipeline, foregrounds, frame_sets, segment.lead, fused, self.cores, factors, start
             ):
                 if packing is None and self.cores() > 1:
                     packing = threads.enter_context(ThreadPoolExecutor(1, "packing"))

@@ -16,7 +16,7 @@ import numpy as np
 from stseg.arrays import Ints, Rows
 from stseg.config import Config, TrackingConfig
 from stseg.tracking.windows.windows import window_length
-from stseg.view_health.hand_over import NO_EXCLUDED_VIEWS, Border
+from stseg.view_health.hand_over import NO_EXCLUDED_VIEWS, SegmentStart
 
 _SHORTEST = 3
 """Length of a segment over that of the least half of a short recording: a shorter one costs too much warm-up."""
@@ -37,9 +37,9 @@ class Segment:
     """EXCLUDED_VIEW (n,): with which it begins."""
 
     @property
-    def border(self) -> Border:
+    def start(self) -> SegmentStart:
         """Where it continues the one before."""
-        return Border(self.first, self.excluded)
+        return SegmentStart(self.first, self.excluded)
 
 
 def segments(
