@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
-from stseg.bodies.box_fit import EDGE_GRAIN, TOLERANCE
+from stseg.bodies.box_fit import EDGE_GRAIN, PRIOR_NOISE
 from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, ScoreParameters
 from stseg.graphcut.grid_energy import GridEnergy
 from stseg.occupancy.fusion import ErrorRates
@@ -58,11 +58,12 @@ def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, heig
     top, bottom = np.clip(body[[1, 3]], 0, height - 1)
     if left >= right or top >= bottom:
         return math.inf
-    middle, width_off, head, late, early = tolerance * (max(float(body[3] - body[1]), 8.0) + EDGE_GRAIN)
-    off = np.array([(left + right) / 2 - (box[0] + box[2]) / 2, right - left - box[2] + box[0], top - box[1]])
-    off = off / [middle, width_off, head]
-    feet = (bottom - box[3]) / (early if box[3] < bottom else late)
-    return math.inf if abs(off[0]) > 4.5 else float((off**2).sum() + feet**2) / 2
+    middle, right_off = (left + right) / 2 - (box[0] + box[2]) / 2, right - left - box[2] + box[0]
+    off = np.array([middle, right_off, top - box[1], bottom - box[3]])
+    off /= max(float(body[3] - body[1]), 8.0) + EDGE_GRAIN
+    off[3] = min(off[3], tolerance[4])
+    off /= tolerance[:4]
+    return math.inf if abs(off[0]) > 4.5 else float((off**2).sum()) / 2
 
 
 def overlap(a: Floats, b: Floats) -> float:
@@ -220,7 +221,7 @@ def plane_likelihood(
             edges = np.clip([left, top, left + wide, top + tall], 0, [size[0] - 1, size[1] - 1] * 2)
             if height >= plane and not np.isnan(body).any():
                 prior = math.exp(-0.5 * ((height - expected) / spread) ** 2)
-                fit = math.exp(-half_square(body, edges, TOLERANCE, *map(float, size)))
+                fit = math.exp(-half_square(body, edges, PRIOR_NOISE.of(np.ones(1))[0][0], *map(float, size)))
                 best = max(best, prior * fit * float(np.clip(boxes.score[b], 0.05, 1)))
     return best
 

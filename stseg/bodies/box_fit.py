@@ -1,8 +1,10 @@
 """Fit of boxes to pillars, and occlusion of pillars by each other.
 
 A box is compared with the box of the pillar, both clipped to the image: its middle, its width, its upper edge, and its
-lower edge, with a larger tolerance where the box ends early, because nearer people and furniture hide feet. They all
-differ from detector to detector, and are learned (`stseg.noise.box_noise_estimate`).
+lower edge. Nearer people and furniture hide feet: with probability h a lower edge lies anywhere over the body's height,
+otherwise at the feet. Of the two the likelier counts, so a box that ends far above the feet says nothing of them, and
+one that ends near them says it sharply. Noise and h differ from detector to detector, and are learned
+(`stseg.noise.box_noise_estimate`).
 """
 
 from dataclasses import dataclass
@@ -14,14 +16,13 @@ from stseg.arrays import Floats, Ints
 from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable, box_of, fill_discs, fill_levels
 from stseg.kernels.accelerate import kernel, part
 
-MIDDLE_OFFSET, WIDTH_OFFSET, UPPER_EDGE, LOWER_EDGE_BELOW, LOWER_EDGE_ABOVE = range(5)
-"""Compared quantities of a box: middle, width, upper edge, lower edge below the feet, and above them."""
-TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06, 0.24])
-"""Their standard deviations in a box of score 1 before learning, shares of the body's height."""
-_PIXELS = np.array([2.0, 2.0, 2.0, 2.0, 8.0])
-"""Quantisation of a detector's grid beside them, pixels."""
-EDGE_GRAIN = _PIXELS / TOLERANCE
-"""The same as pixels added to the height of which tolerances are shares: a sharper detector's grid is finer, too."""
+MIDDLE_OFFSET, WIDTH_OFFSET, UPPER_EDGE, LOWER_EDGE, FEET_LIMIT = range(5)
+"""Compared quantities of a box: middle, width, upper and lower edge; then how far above feet those are not hidden."""
+TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06])
+"""Tolerances of the four in a box of score 1 before learning, shares of the body's height."""
+EDGE_GRAIN = 2.0 / TOLERANCE
+"""Pixels added to the height of which tolerances are shares: 2 pixels, since a sharper detector's grid is finer, too.
+"""
 MATCH_LIMIT = 4.5
 """Offsets of the middle beyond this many tolerances exclude a match."""
 LEAST_PIXEL_HEIGHT = 8.0
@@ -36,7 +37,7 @@ class ViewBoxes(NamedTuple):
     edges: Floats
     """float64 (box, 4): left, top, right, bottom, pixels, within the image."""
     tolerance: Floats
-    """float64 (box, 5): tolerances of each box; see `half_square` and `BoxNoise`."""
+    """float64 (box, 5): tolerances and `FEET_LIMIT` of each box; see `half_square` and `BoxNoise`."""
     belief: Floats
     """float64 (box,): belief in each box; see `half_square` and `BoxNoise`."""
     width: float
@@ -48,7 +49,8 @@ class ViewBoxes(NamedTuple):
 def half_square(body: Edges, box: Floats, tolerance: Floats, width: float, height: float) -> float:
     """Half the squared Mahalanobis distance of a box from a pillar's box, both left, top, right, bottom in pixels.
 
-    `tolerance` float64 (5,) holds standard deviations, shares of the body's height in the image and its grain.
+    `tolerance` float64 (5,) holds standard deviations, and the limit at which feet are taken for hidden: shares of the
+    body's height in the image and its grain.
     """
     left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
     if right <= left:
@@ -62,7 +64,7 @@ def half_square(body: Edges, box: Floats, tolerance: Floats, width: float, heigh
         return np.inf
     wide /= tolerance[WIDTH_OFFSET]
     head /= tolerance[UPPER_EDGE]
-    feet /= tolerance[LOWER_EDGE_ABOVE if feet > 0 else LOWER_EDGE_BELOW]
+    feet = min(feet, tolerance[FEET_LIMIT]) / tolerance[LOWER_EDGE]
     return float(0.5 * (middle * middle + wide * wide + head * head + feet * feet))
 
 
@@ -87,7 +89,7 @@ def _offsets(body: Edges, box: Floats, width: float, height: float) -> tuple[flo
         ((left + right) - (box[0] + box[2])) / 2.0 / (tall + EDGE_GRAIN[MIDDLE_OFFSET]),
         ((right - left) - (box[2] - box[0])) / (tall + EDGE_GRAIN[WIDTH_OFFSET]),
         (top - box[1]) / (tall + EDGE_GRAIN[UPPER_EDGE]),
-        (bottom - box[3]) / (tall + EDGE_GRAIN[LOWER_EDGE_BELOW]),
+        (bottom - box[3]) / (tall + EDGE_GRAIN[LOWER_EDGE]),
     )
 
 
@@ -140,31 +142,40 @@ SCORE_KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
 """Scores of the table; between them logarithms are interpolated."""
 
 
+HIDDEN_FEET = 0.2
+"""Share of boxes whose feet are hidden, before learning."""
+
+
 @dataclass(frozen=True)
 class BoxNoise:
-    """Noise of a detector's boxes: standard deviations of their offsets at each knot of the score, float64 (knot, 5).
+    """Noise of a detector's boxes: standard deviations of their offsets at each knot of the score, float64 (knot, 4).
 
     One detector draws the sides of a box within 2 % of a body's height, another within 7 %; most are less exact where
     their score is lower. Errors of the edges of one box are correlated, and so are those of the views where a body is
     no pillar: an edge counts as half an observation. Its tolerance is wider than its standard deviation by the root of
     two, and a noisier box says less for the person that it fits, by half the logarithms of the ratios of its
-    tolerances. By the first guess, in which standard deviations grow with one over the root of the score, that is the
-    logarithm of the score.
+    tolerances, and of the shares of boxes with feet. By the first guess, in which standard deviations grow with one
+    over the root of the score, that is the logarithm of the score.
 
     The width is not learned: arms and strides change it, from frame to frame together, however sharp the detector is.
     """
 
     spread: Floats
+    hidden_feet: Floats
+    """float64 (knot,): share of boxes whose feet are hidden, 0..1."""
     scale: float = 1.0
     """Factor of offsets and tolerances: low, long bodies err by more of their height (`BodyConfig.stoutness`)."""
 
     def of(self, score: Floats) -> tuple[Floats, Floats]:
         """Boxes' tolerances float64 (box, 5), and what each says by itself, nats, float64 (box,); scores are 0..1."""
         lower, share = knots_of(score)
-        logs = np.log(self.spread)
-        spread = np.exp(logs[lower] * (1 - share[:, None]) + logs[lower + 1] * share[:, None])
-        tolerance = spread / np.sqrt(EFFECTIVE_OBSERVATIONS)
-        return tolerance * self.scale, EFFECTIVE_OBSERVATIONS * np.log(_sides(TOLERANCE) / _sides(tolerance)).sum(-1)
+        logs = np.log(np.column_stack([self.spread, self.hidden_feet]))
+        *spread, hidden = np.exp(logs[lower] * (1 - share[:, None]) + logs[lower + 1] * share[:, None]).T
+        tolerance = np.column_stack(spread) / np.sqrt(EFFECTIVE_OBSERVATIONS)
+        odds = (1 - hidden) / (hidden * np.sqrt(2 * np.pi) * spread[LOWER_EDGE])
+        limit = tolerance[:, LOWER_EDGE] * np.sqrt(np.log(np.maximum(odds, 1.0)))
+        sharpness = np.log(TOLERANCE / tolerance).sum(-1) + np.log((1 - hidden) / (1 - HIDDEN_FEET))
+        return np.column_stack([tolerance, limit]) * self.scale, EFFECTIVE_OBSERVATIONS * sharpness
 
 
 def knots_of(score: Floats) -> tuple[np.ndarray, Floats]:
@@ -174,11 +185,7 @@ def knots_of(score: Floats) -> tuple[np.ndarray, Floats]:
     return lower, at - lower
 
 
-def _sides(spread: Floats) -> Floats:
-    """The lower edge's two standard deviations as one, (..., 4)."""
-    foot = (spread[..., LOWER_EDGE_BELOW] + spread[..., LOWER_EDGE_ABOVE]) / 2
-    return np.concatenate([spread[..., :LOWER_EDGE_BELOW], foot[..., None]], -1)
-
-
-PRIOR_NOISE = BoxNoise(TOLERANCE * np.sqrt(EFFECTIVE_OBSERVATIONS / SCORE_KNOTS)[:, None])
+PRIOR_NOISE = BoxNoise(
+    TOLERANCE * np.sqrt(EFFECTIVE_OBSERVATIONS / SCORE_KNOTS)[:, None], np.full(len(SCORE_KNOTS), HIDDEN_FEET)
+)
 """Before anything is learned."""

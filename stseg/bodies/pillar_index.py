@@ -13,9 +13,9 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.bodies.box_fit import (
     EDGE_GRAIN,
+    FEET_LIMIT,
     LEAST_PIXEL_HEIGHT,
-    LOWER_EDGE_ABOVE,
-    LOWER_EDGE_BELOW,
+    LOWER_EDGE,
     MATCH_LIMIT,
     MIDDLE_OFFSET,
     UPPER_EDGE,
@@ -99,13 +99,14 @@ def fill_fits(
         return 0
     deviations = math.sqrt(2.0 * spare)
     top, bottom = box[1], box[3]
+    may_hide = deviations * tolerance[LOWER_EDGE] > tolerance[FEET_LIMIT]
     for kind in range(len(index.tallest)):
         tall = index.tallest[kind]
         head = _reach(UPPER_EDGE, tall, tolerance, deviations)
-        late = _reach(LOWER_EDGE_BELOW, tall, tolerance, deviations)
+        late = _reach(LOWER_EDGE, tall, tolerance, deviations)
         if tall + head + late < bottom - top:
             continue
-        early = _reach(LOWER_EDGE_ABOVE, tall, tolerance, deviations)
+        early = np.inf if may_hide else late
         first, stop = pillar_range(index, kind, box, tolerance, min(MATCH_LIMIT, deviations))
         for k in range(np.uint64(first), np.uint64(stop)):  # most pillars are decided by their edges
             if abs(index.top[k] - top) > head or not -late <= index.bottom[k] - bottom <= early:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import AlignedBoxes, Boxes, Flags, Floats, ViewEvidence
-from stseg.bodies.box_fit import EDGE_GRAIN, LOWER_EDGE_BELOW
+from stseg.bodies.box_fit import EDGE_GRAIN, LOWER_EDGE
 
 SHIFT_TERMS = 3
 """Number of terms of a shift: b_0, b_1, b_2."""
@@ -38,7 +38,7 @@ class BoxBias:
     def _corrected(self, boxes: Boxes, shift: Floats, size: tuple[int, int]) -> AlignedBoxes:
         edges, tall = boxes.pixel.copy(), boxes.pixel[:, 3]
         edges[:, 2:] += edges[:, :2]
-        moved = np.maximum(tall + self.lower_edge * (tall + EDGE_GRAIN[LOWER_EDGE_BELOW]), 1.0)
+        moved = np.maximum(tall + self.lower_edge * (tall + EDGE_GRAIN[LOWER_EDGE]), 1.0)
         height = np.where(whole_boxes(edges, size), moved, tall)
         sides = (edges[:, 0] > 0) & (edges[:, 2] < size[0] - 1)
         right = np.where(sides, shift_terms(edges, size) @ shift, 0.0)

@@ -5,8 +5,9 @@ off by e, the offsets of lower edges and of middles of boxes from a body of h pi
 
     d_k = m - J_k e + noise,    c_k = s_k / h - K_k e + noise,
 
-with derivatives J, K by the place and equal noise. Least squares without e leave normal equations of m and b (Schur
-complement), which say nothing by one view, or by views that look the same way. Equations of all people and frames add
+with derivatives J, K by the place, and the noise of each box. Least squares without e leave normal equations of m and b
+(Schur complement), which say nothing by one view, or by views that look the same way. The errors of one box last for a
+second, so that the boxes of a second are one. Equations of all people and frames add
 up, in seconds of one person, forgotten as all that is learned (`stseg.records.forgetting`). Boxes are corrected before
 they are observed, and offsets are those of boxes as they were delivered.
 
@@ -20,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats, Ints, ViewEvidence
-from stseg.bodies.box_fit import EDGE_GRAIN, LEAST_PIXEL_HEIGHT, MIDDLE_OFFSET, fill_offsets
+from stseg.bodies.box_fit import EDGE_GRAIN, LEAST_PIXEL_HEIGHT, LOWER_EDGE, MIDDLE_OFFSET, fill_offsets
 from stseg.bodies.views import View, ViewObservations
 from stseg.config import ErrorRateConfig
 from stseg.noise.box_bias import SHIFT_TERMS, BoxBias, shift_terms
@@ -28,22 +29,20 @@ from stseg.noise.box_noise_estimate import explained_boxes
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation
 
-_PRIOR_WEIGHT = 2.0
-"""Weight of no error, seconds of one box: the errors of one box last for a second, and are as large."""
-_NOISE, _SHIFT_ERROR = 0.03, 0.01
-"""Standard deviations: of a middle, shares of a body's height, and of the terms of a shift, shares of the image's
-width: of views placed by hand, or with a lens that was taken for straight."""
+_LOWER_EDGE_ERROR, _SHIFT_ERROR = 0.02, 0.01
+"""Standard deviations of errors before learning: of lower edges, shares of a body's height, and of the terms of a
+shift, shares of the image's width: of views placed by hand, or with a lens that was taken for straight."""
 _LARGEST_OFFSET = 0.15
 """Largest offset that is an error and not the box of another body: 2.5 standard deviations, shares of the height."""
 _DIFFERENCE = 0.05
 _DIFFERENCES = _DIFFERENCE * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 """Differences of places by which offsets are differentiated, metres."""
-_LEAST_INFORMATION = 1e-6
+_LEAST_INFORMATION = 1e-3
 """Information on a place without boxes, per square metre."""
 
 
 class _Offsets(NamedTuple):
-    """Offsets of edges from the bodies of their people."""
+    """Offsets of edges from the bodies of their people, in tolerances of the edges."""
 
     person: Ints
     """int64 (n,)."""
@@ -52,7 +51,7 @@ class _Offsets(NamedTuple):
     by_place: Floats
     """float64 (n, 2): by metres in x and y."""
     offset: Floats
-    """float64 (n,): of boxes as they were delivered, shares of the height."""
+    """float64 (n,): of boxes as they were delivered."""
 
 
 class BoxBiasEstimate:
@@ -72,8 +71,8 @@ class BoxBiasEstimate:
         self._config, size = config, 1 + SHIFT_TERMS * views
         self.equations = Forgetting((size, size + 1), frame_rate, config.memory)
         """(error, error + 1): information on m and b, and what it says of them; both times seconds."""
-        self._prior = np.full(size, (_NOISE / _SHIFT_ERROR) ** 2)
-        self._prior[0] = _PRIOR_WEIGHT
+        self._prior = np.full(size, _SHIFT_ERROR**-2)
+        self._prior[0] = _LOWER_EDGE_ERROR**-2
         self._corrected = np.zeros(size)
 
     @property
@@ -96,15 +95,17 @@ class BoxBiasEstimate:
         """Count the frame whose boxes were corrected last."""
         self.equations.forget()
         offsets = [
-            self._offsets(k, views[k], explanation, person, observation.edges[box])
+            self._offsets(k, views[k], explanation, person, observation.edges[box], observation.tolerance[box])
             for k, person, observation, box in explained_boxes(explanation, views, observations, self._config)
         ]
         if offsets:
             every = _Offsets(*map(np.concatenate, zip(*offsets, strict=True)))
             self.equations.add(self.equations.seconds(_without_places(every, len(explanation.people))))
 
-    def _offsets(self, k: int, view: View, explanation: Explanation, person: Ints, edges: Floats) -> _Offsets:
-        """Lower edges and middles of view k, of people who stand free in it, edges (n, 4)."""
+    def _offsets(
+        self, k: int, view: View, explanation: Explanation, person: Ints, edges: Floats, tolerance: Floats
+    ) -> _Offsets:
+        """Lower edges and middles of view k, of people who stand free in it, edges (n, 4), tolerance (n, 5)."""
         people, size = explanation.people, len(self._prior)
         middle, lower, tall = _linear_offsets(view, people.ground[person], people.height[person], edges)
         by_error = np.zeros((2, len(person), size))
@@ -112,9 +113,11 @@ class BoxBiasEstimate:
         by_error[1, :, 1 + SHIFT_TERMS * k :][:, :SHIFT_TERMS] = shift_terms(edges, view.camera.size) / tall[:, None]
         offset = np.stack([lower[:, 0], middle[:, 0]]) + by_error @ self._corrected
         free = people.is_free[k, person] & (np.abs(offset) < _LARGEST_OFFSET).all(0)
-        by_place = -np.stack([lower[:, 1:], middle[:, 1:]])[:, free]
-        found = by_error[:, free].reshape(-1, size), by_place.reshape(-1, 2), offset[:, free].ravel()
-        return _Offsets(np.tile(person[free], 2), *found)
+        by_place = -np.stack([lower[:, 1:], middle[:, 1:]])
+        weight = 1.0 / tolerance[free][:, [LOWER_EDGE, MIDDLE_OFFSET]].T.ravel()
+        equations = np.concatenate([by_error, by_place, offset[..., None]], -1)[:, free].reshape(-1, size + 3)
+        by_error, by_place, offset = np.split(weight[:, None] * equations, [size, size + 2], 1)
+        return _Offsets(np.tile(person[free], 2), by_error, by_place, offset.ravel())
 
 
 def _linear_offsets(view: View, ground: Floats, height: Floats, edges: Floats) -> tuple[Floats, Floats, Floats]:

@@ -7,27 +7,27 @@ it was spent on the place: E r^2 = sigma^2 (1 - v / t^2). Over n = sum (1 - v / 
     sigma^2 = S / n,
 
 whatever the noise was taken for before; boxes of a person seen by one view alone say nothing. `prior_weight` seconds of
-one person's box at the first guess are among them, and what was counted is forgotten (`stseg.records.forgetting`). The
-lower edge has two, of one density that is steeper below the feet than above: with S_1, S_2 the sums of squares on
-either side,
+one person's box at the first guess are among them, and what was counted is forgotten (`stseg.records.forgetting`). A
+lower edge counts by the probability that it is at the feet, with h / (1 - h) the odds of hidden feet by their share:
 
-    sigma_1 = S_1^(1/3) sqrt((S_1^(1/3) + S_2^(1/3)) / n),
+    p(hidden) / p(at the feet) = h / ((1 - h) N(r; 0, sigma^2)) = exp((r^2 - l^2) / t^2)
 
-the most likely ones of a split normal distribution of known mode. People count for a view where the rest of the
-evidence supports them, and boxes at the border of the image, which are cut there, do not count.
+where it ends r above the feet, with l the limit of `stseg.bodies.box_fit` and t^2 = 2 sigma^2; the mean of p(hidden) is
+h. People count for a view where the rest of the evidence supports them, and boxes at the border of the image, which are
+cut there, do not count.
 """
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.special import expit
 
 from stseg.arrays import Floats, Ints
 from stseg.bodies.box_fit import (
-    LOWER_EDGE_ABOVE,
-    LOWER_EDGE_BELOW,
+    FEET_LIMIT,
+    LOWER_EDGE,
     PRIOR_NOISE,
     SCORE_KNOTS,
-    TOLERANCE,
     WIDTH_OFFSET,
     BoxNoise,
     fill_offsets,
@@ -39,9 +39,6 @@ from stseg.noise.box_bias import whole_boxes
 from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation, People
 
-_LOWER_EDGE = [LOWER_EDGE_BELOW, LOWER_EDGE_ABOVE]
-_QUANTITY = [*range(LOWER_EDGE_BELOW + 1), LOWER_EDGE_BELOW]
-"""Where the offset of each tolerance stands among the four of a box: the lower edge has two."""
 _POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 """Places and heights that stand for a posterior: its means and variances are theirs (unscented transform)."""
 
@@ -59,22 +56,19 @@ class BoxNoiseEstimate:
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig, scale: float = 1.0) -> None:
         self._config, self._scale = config, scale
-        self.offsets = Forgetting((len(SCORE_KNOTS), 2, len(TOLERANCE)), frame_rate, config.memory)
-        """(knot, 2, 5): degrees of freedom, and squared offsets; both times seconds."""
+        self.offsets = Forgetting((len(SCORE_KNOTS), 2, FEET_LIMIT + 1), frame_rate, config.memory)
+        """(knot, 2, 5): degrees of freedom, and squared offsets; of the last, boxes, and those with hidden feet. All
+        are times seconds."""
 
     @property
     def noise(self) -> BoxNoise:
         """The noise by all frames so far."""
-        first, ones = PRIOR_NOISE.spread**2, np.ones_like(PRIOR_NOISE.spread)
-        lower = PRIOR_NOISE.spread[:, _LOWER_EDGE]
-        ones[:, _LOWER_EDGE] = lower / lower.sum(1, keepdims=True)
-        counted = self.offsets.with_prior(self._config.prior_weight, np.stack([ones, first * ones], 1))
-        freedom, squares = counted[:, 0], counted[:, 1]
-        spread, root = np.sqrt(squares / freedom), np.cbrt(squares[:, _LOWER_EDGE])
-        both = freedom[:, _LOWER_EDGE].sum(1, keepdims=True)
-        spread[:, _LOWER_EDGE] = root * np.sqrt(root.sum(1, keepdims=True) / both)
+        first = np.column_stack([PRIOR_NOISE.spread**2, PRIOR_NOISE.hidden_feet])
+        counted = self.offsets.with_prior(self._config.prior_weight, np.stack([np.ones_like(first), first], 1))
+        mean = counted[:, 1] / counted[:, 0]
+        spread = np.sqrt(mean[:, :FEET_LIMIT])
         spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
-        return BoxNoise(spread, self._scale)
+        return BoxNoise(spread, mean[:, FEET_LIMIT], self._scale)
 
     def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count one frame."""
@@ -82,7 +76,8 @@ class BoxNoiseEstimate:
         for k, person, observation, box in explained_boxes(explanation, views, observations, self._config):
             edges, tolerance = observation.edges[box], observation.tolerance[box]
             counted = _counted(views[k], explanation.people, person, edges, tolerance)
-            self._count(observation.score[box], counted / np.array([[1.0], [self._scale**2]]))
+            counted[:, 1, :FEET_LIMIT] /= self._scale**2
+            self._count(observation.score[box], counted)
 
     def _count(self, score: Floats, counted: Floats) -> None:
         lower, share = knots_of(score)
@@ -103,14 +98,21 @@ def explained_boxes(
 
 
 def _counted(view: View, people: People, person: Ints, edges: Floats, tolerance: Floats) -> Floats:
-    """Degrees of freedom and squared offsets of people's boxes, float64 (box, 2, 5)."""
+    """What people's boxes add to the sums, float64 (box, 2, 5)."""
     offsets = _offsets(view, people, person, edges)
-    mean, variance = (moment[:, _QUANTITY] for moment in (offsets.mean(0), offsets.var(0)))
-    is_below = mean[:, LOWER_EDGE_BELOW] <= 0
-    side = np.ones_like(tolerance)
-    side[:, _LOWER_EDGE] = np.column_stack([is_below, ~is_below])
-    counted = side[:, None] * np.stack([np.maximum(1.0 - variance / tolerance**2, 0.0), mean**2], 1)
-    return np.where(np.isnan(counted).any(1, keepdims=True), 0.0, counted)
+    mean, variance = offsets.mean(0), offsets.var(0)
+    freedom = np.maximum(1.0 - variance / tolerance[:, :FEET_LIMIT] ** 2, 0.0)
+    counted = np.stack([freedom, mean**2], 1)
+    hidden = _hidden_feet(mean[:, LOWER_EDGE], tolerance)
+    counted[..., LOWER_EDGE] *= (1.0 - hidden)[:, None]
+    of_feet = freedom[:, LOWER_EDGE, None] * np.column_stack([np.ones_like(hidden), hidden])
+    return np.nan_to_num(np.concatenate([counted, of_feet[..., None]], -1))
+
+
+def _hidden_feet(offset: Floats, tolerance: Floats) -> Floats:
+    """Probability that feet are hidden by how far boxes end above them, float64 (box,)."""
+    log_odds = (offset**2 - tolerance[:, FEET_LIMIT] ** 2) / tolerance[:, LOWER_EDGE] ** 2
+    return np.where(offset > 0, expit(log_odds), 0.0)
 
 
 def _offsets(view: View, people: People, person: Ints, edges: Floats) -> Floats:

@@ -14,7 +14,16 @@ from scenes import BODY, FEW_HEIGHTS, corner_cameras, likelihoods, looking, peop
 
 import stseg
 from stseg.arrays import Flags, Floats, Singles
-from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, ViewBoxes, add_own_fits, fill_inside, fill_match, half_square
+from stseg.bodies.box_fit import (
+    FEET_LIMIT,
+    LOWER_EDGE,
+    PRIOR_NOISE,
+    ViewBoxes,
+    add_own_fits,
+    fill_inside,
+    fill_match,
+    half_square,
+)
 from stseg.bodies.outlines import Pillars, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable
@@ -28,6 +37,7 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.records.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
+TOLERANCE = PRIOR_NOISE.of(np.ones(1))[0][0]
 EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(2, 150)).map(
     lambda b: np.array([b[0], b[1], b[0] + b[2], b[1] + b[3]])
 )
@@ -39,12 +49,14 @@ def test_half_square_by_definition(body: Floats, box: Floats) -> None:
     assert half_square(body, box, TOLERANCE, WIDTH, HEIGHT) == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
-    body = np.array([50.0, 20.0, 62.0, 70.0])
-    assert half_square(body, body, TOLERANCE, WIDTH, HEIGHT) == 0.0
-    early, late = body + np.array([[0, 0, 0, -8], [0, 0, 0, 8]])
-    late_cost, early_cost = (half_square(body, box, TOLERANCE, WIDTH, HEIGHT) for box in (late, early))
-    assert late_cost == pytest.approx(16 * early_cost)
+def test_feet_far_above_are_hidden() -> None:
+    """A box that ends late is as costly as its error; one that ends early at most as much as hidden feet are."""
+    body = np.array([50.0, 10.0, 62.0, 70.0])
+    moved = [body + np.array([0, 0, 0, rows]) for rows in (0, 2, -2, 20, -20, -40)]
+    cost = [half_square(body, box, TOLERANCE, WIDTH, HEIGHT) for box in moved]
+    limit = TOLERANCE[FEET_LIMIT] / TOLERANCE[LOWER_EDGE]
+    assert cost[0] == 0.0 and cost[1] == pytest.approx(cost[2]) and cost[3] == pytest.approx(100 * cost[1])
+    assert cost[4] == cost[5] == pytest.approx(limit**2 / 2)
 
 
 @drawn(100, st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.lists(EDGES, max_size=3), st.integers(0, 99))

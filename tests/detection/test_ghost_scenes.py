@@ -34,7 +34,7 @@ FIVE = (
     people((1.2, -1.3), (-0.3, -0.6, 1.8), (0.4, 1.4, 1.65), (-1.4, 0.7, 1.75), (-1.1, -1.4, 1.6)),
 )
 """Five people in the room, who hide each other in most views."""
-GHOSTS = {("pixels", 2): 5, ("pixels", 3): 3, ("pixels", 4): 2, ("boxes", 2): 1}
+GHOSTS = {("pixels", 2): 5, ("pixels", 3): 3, ("pixels", 4): 2}
 """Ghosts that so many views make of them in a first frame, at least."""
 
 

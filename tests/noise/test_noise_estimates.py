@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter
 
 from stseg.arrays import Boxes, Floats, Singles, ViewEvidence
 from stseg.bodies import box_fit
-from stseg.bodies.box_fit import PRIOR_NOISE, TOLERANCE, WIDTH_OFFSET
+from stseg.bodies.box_fit import FEET_LIMIT, HIDDEN_FEET, LOWER_EDGE, PRIOR_NOISE, TOLERANCE, WIDTH_OFFSET
 from stseg.bodies.views import ViewObservation
 from stseg.config import BodyConfig, Config, DetectionConfig, ErrorRateConfig
 from stseg.detection.detector import Detector
@@ -32,14 +32,15 @@ from stseg.records.people import People
 
 RATE = 5.0
 CONFIG = ErrorRateConfig(memory=1e6, prior_weight=2.0)
+SHARP = replace(PRIOR_NOISE, spread=PRIOR_NOISE.spread / 4)
 
 
 @drawn(100, st.lists(st.floats(0, 1), max_size=5))
 def test_what_is_sharper_says_more(scores: list[float]) -> None:
     score = np.array(scores)
     tolerance, belief = PRIOR_NOISE.of(score)
-    sharper, more = box_fit.BoxNoise(PRIOR_NOISE.spread / 2).of(score)
-    np.testing.assert_allclose(sharper, tolerance / 2)
+    sharper, more = replace(PRIOR_NOISE, spread=PRIOR_NOISE.spread / 2).of(score)
+    np.testing.assert_allclose(sharper[:, :FEET_LIMIT], tolerance[:, :FEET_LIMIT] / 2)
     np.testing.assert_allclose(more - belief, 4 * box_fit.EFFECTIVE_OBSERVATIONS * np.log(2))
 
 
@@ -53,26 +54,27 @@ def test_noise_begins_at_the_prior_by_score_and_forgets() -> None:
         sharpening.offsets.forget()
     np.testing.assert_allclose(sharpening.noise.spread[-1], PRIOR_NOISE.spread[-1], rtol=1e-3)
     tolerance, belief = PRIOR_NOISE.of(np.array([1.0, 0.6, 0.2]))
-    np.testing.assert_allclose(tolerance[0], TOLERANCE)
+    np.testing.assert_allclose(tolerance[0, :FEET_LIMIT], TOLERANCE)
     np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
 
 
-def taught(sharpening: BoxNoiseEstimate, spread: float, score: float, frames: int) -> None:
-    """Boxes of three people in four views, edges off by so much of the height; every fourth ends far above the feet."""
+def taught(sharpening: BoxNoiseEstimate, spread: float, score: float, frames: int, hidden: float = 0.0) -> None:
+    """Boxes of three people in four views, edges off by so much of the height; some end far above the feet."""
     rng, frame_pass = np.random.default_rng(3), detector_of(room(), "boxes")
     for _ in range(frames):
-        seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6), (0.6, 0.8)), spread, score, rng)
+        seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6), (0.6, 0.8)), spread, score, rng, hidden)
         sharpening.learn(frame_pass.explain(seen, None), frame_pass.views, frame_pass.observe(seen))
 
 
 def shaken_boxes(
-    detector: Detector, standing: Floats, spread: float, score: float, rng: np.random.Generator
+    detector: Detector, standing: Floats, spread: float, score: float, rng: np.random.Generator, hidden: float = 0.0
 ) -> list[Boxes]:
     found = []
     for view in detector.views:
         bodies = view.table.boxes_of(standing[:, :2], standing[:, 2])
-        tall = bodies[:, 3] - bodies[:, 1] + box_fit.EDGE_GRAIN[: box_fit.LOWER_EDGE_BELOW + 1, None]
+        tall = bodies[:, 3] - bodies[:, 1] + box_fit.EDGE_GRAIN[:, None]
         middle, wide, head, foot = rng.normal(0, spread, (4, len(bodies))) * tall
+        foot -= (rng.random(len(bodies)) < hidden) * rng.uniform(0.2, 0.7, len(bodies)) * tall[LOWER_EDGE]
         left, right = bodies[:, 0] + middle - wide / 2, bodies[:, 2] + middle + wide / 2
         top, bottom = bodies[:, 1] + head, bodies[:, 3] + foot
         found.append(Boxes(np.column_stack([left, top, right - left, bottom - top]), np.full(len(bodies), score)))
@@ -80,13 +82,16 @@ def shaken_boxes(
 
 
 @pytest.mark.parametrize("spread", [0.015, 0.03, 0.04])
-def test_the_spread_of_boxes_is_found(spread: float) -> None:
+@pytest.mark.parametrize("hidden", [0.0, 0.25])
+def test_the_spread_of_boxes_and_hidden_feet_are_found(spread: float, hidden: float) -> None:
     sharpening = BoxNoiseEstimate(RATE, CONFIG)
-    taught(sharpening, spread, 1.0, 60)
-    learned = sharpening.noise.spread
-    found = np.delete(learned[-1], WIDTH_OFFSET) / spread
-    assert ((found > 0.8) & (found < (1.25, 1.25, 1.25, 1.9))).all()  # few end above feet
-    np.testing.assert_allclose(learned[:-2], PRIOR_NOISE.spread[:-2])
+    taught(sharpening, spread, 1.0, 60, hidden)
+    learned = sharpening.noise
+    found = np.delete(learned.spread[-1], WIDTH_OFFSET) / spread
+    assert ((found > 0.8) & (found < 1.25)).all()
+    assert learned.hidden_feet[-1] == pytest.approx(hidden, abs=0.05)
+    np.testing.assert_allclose(learned.spread[:-2], PRIOR_NOISE.spread[:-2])
+    np.testing.assert_allclose(learned.hidden_feet[:-2], HIDDEN_FEET)
 
 
 @pytest.mark.parametrize("views", [4, 2, 1])
@@ -100,7 +105,7 @@ def test_places_are_as_sure_as_they_are_right(views: int) -> None:
         if len(person) == 1:
             off = person.ground[0] - (x, y)
             squares.append(off @ np.linalg.solve(person.covariance[0], off))
-    assert len(squares) > 70 and 0.7 < np.mean(squares) < 1.4
+    assert len(squares) > 60 and 0.7 < np.mean(squares) < 1.4
 
 
 def test_boxes_of_a_view_that_is_turned_move_to_their_people() -> None:
@@ -112,7 +117,7 @@ def test_boxes_of_a_view_that_is_turned_move_to_their_people() -> None:
         seen = shaken_boxes(frame_pass, people((x - 0.25, y), (x + 0.25, y)), 0.01, 1.0, rng)
         seen[1].pixel[:, 0] -= 0.02 * sizes[1][0]
         corrected = estimate.corrected(seen, sizes)
-        explanation, observed = frame_pass.explain(corrected, None), frame_pass.observe(corrected)
+        explanation, observed = frame_pass.explain(corrected, None), frame_pass.observe(corrected, SHARP)
         estimate.learn(explanation, frame_pass.views, observed)
         found.append(explanation.residual)
     np.testing.assert_allclose(estimate.bias.shift, [[0.02 * (k == 1), 0, 0] for k in range(4)], atol=0.004)
@@ -124,7 +129,7 @@ def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
     frame_pass, estimate = detector_of(room(), "boxes"), BoxBiasEstimate(4, RATE, CONFIG)
     standing, sizes = people((-0.5, 0.3, 1.7), (0.5, -0.4, 1.7)), [view.camera.size for view in frame_pass.views]
     bodies = [view.table.boxes_of(standing[:, :2], standing[:, 2]) for view in frame_pass.views]
-    grain = box_fit.EDGE_GRAIN[box_fit.LOWER_EDGE_BELOW]
+    grain = box_fit.EDGE_GRAIN[LOWER_EDGE]
     delivered = []
     for body in bodies:
         high = body[:, 3] - body[:, 1] - bias * (body[:, 3] - body[:, 1] + grain)
@@ -132,7 +137,8 @@ def test_boxes_that_end_beside_the_feet_are_corrected(bias: float) -> None:
         delivered.append(Boxes(pixel, np.ones(len(body))))
     for _ in range(25):
         corrected = estimate.corrected(delivered, sizes)
-        estimate.learn(frame_pass.explain(corrected, None), frame_pass.views, frame_pass.observe(corrected))
+        observed = frame_pass.observe(corrected, SHARP)
+        estimate.learn(frame_pass.explain(corrected, None), frame_pass.views, observed)
     assert estimate.bias.lower_edge == pytest.approx(bias, abs=0.015) and np.abs(estimate.bias.shift).max() < 0.003
     explanation, weight = frame_pass.explain(corrected, None), estimate.equations.sums[0, 0]
     one = [np.full_like(owner, -1) if k else owner for k, owner in enumerate(explanation.box_assignment)]

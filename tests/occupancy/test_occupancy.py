@@ -13,7 +13,7 @@ from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, detector_of, eviden
 from strategies import rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
-from stseg.bodies.box_fit import TOLERANCE, ViewBoxes
+from stseg.bodies.box_fit import PRIOR_NOISE, ViewBoxes
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable
 from stseg.config import OccupancyConfig
@@ -135,7 +135,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
     pillars, height = bodies.reshape(-1, 4).astype(np.float32), np.array([1.7, 1.6, 1.8])
     prior = -0.5 * ((tried - height[:, None]) / 0.1) ** 2
-    tolerance = np.tile(TOLERANCE, (len(found), 1))
+    tolerance, _ = PRIOR_NOISE.of(np.ones(len(found)))
     view = ViewBoxes(edges, tolerance, np.log(shaken.score), 128.0, 96.0)
     fit = CellFit.unfilled(3, 16)
     index, cells = PillarIndex.of(pillars, camera.size), Vicinity.of(near_person, 2)
