@@ -98,7 +98,7 @@ def explained_boxes(
 
 
 def _counted(view: View, people: People, person: Ints, edges: Floats, tolerance: Floats) -> Floats:
-    """What people's boxes add to the sums, float64 (box, 2, 5)."""
+    """Shares of people's boxes in the sums, float64 (box, 2, 5)."""
     offsets = _offsets(view, people, person, edges)
     mean, variance = offsets.mean(0), offsets.var(0)
     freedom = np.maximum(1.0 - variance / tolerance[:, :FEET_LIMIT] ** 2, 0.0)
@@ -106,7 +106,7 @@ def _counted(view: View, people: People, person: Ints, edges: Floats, tolerance:
     hidden = _hidden_feet(mean[:, LOWER_EDGE], tolerance)
     counted[..., LOWER_EDGE] *= (1.0 - hidden)[:, None]
     of_feet = freedom[:, LOWER_EDGE, None] * np.column_stack([np.ones_like(hidden), hidden])
-    return np.nan_to_num(np.concatenate([counted, of_feet[..., None]], -1))
+    return np.asarray(np.nan_to_num(np.concatenate([counted, of_feet[..., None]], -1)))
 
 
 def _hidden_feet(offset: Floats, tolerance: Floats) -> Floats:
