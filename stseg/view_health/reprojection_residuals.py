@@ -3,8 +3,7 @@
 They are small for all views of a sound rig, and a knocked camera shows in its first frame. A view measures places well
 across its line of sight. People at a distance from all others in it, and boxes of people who stand free, are located
 along that direction by this view alone and compared with their places by all views; boxes count as they were delivered,
-before any alignment. The mean of one
-frame is rough, the median over minutes good to a centimetre or two.
+before any alignment. The mean of one frame is rough, the median over minutes good to a centimetre or two.
 """
 
 from collections.abc import Sequence
