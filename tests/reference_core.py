@@ -40,6 +40,8 @@ def kalman(
     return state + gain @ (place - matrix @ state), (np.eye(len(state)) - gain @ matrix) @ covariance
 
 
+PRIOR_TOLERANCE = PRIOR_NOISE.of(np.ones(1), np.zeros(1, bool))[0][0]
+"""Of a box of score 1 whose feet no other box covers."""
 Edge = tuple[int, int, int]
 """Two cells of a flattened volume, and the capacity between them."""
 
@@ -221,7 +223,7 @@ def plane_likelihood(
             edges = np.clip([left, top, left + wide, top + tall], 0, [size[0] - 1, size[1] - 1] * 2)
             if height >= plane and not np.isnan(body).any():
                 prior = math.exp(-0.5 * ((height - expected) / spread) ** 2)
-                fit = math.exp(-half_square(body, edges, PRIOR_NOISE.of(np.ones(1))[0][0], *map(float, size)))
+                fit = math.exp(-half_square(body, edges, PRIOR_TOLERANCE, *map(float, size)))
                 best = max(best, prior * fit * float(np.clip(boxes.score[b], 0.05, 1)))
     return best
 

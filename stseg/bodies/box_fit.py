@@ -3,7 +3,8 @@
 A box is compared with the box of the pillar, both clipped to the image: its middle, its width, its upper edge, and its
 lower edge. Nearer people and furniture hide feet: with probability h a lower edge lies anywhere over the body's height,
 otherwise at the feet. Of the two the likelier counts, so a box that ends far above the feet says nothing of them, and
-one that ends near them says it sharply. Noise and h differ from detector to detector, and are learned
+one that ends near them says it sharply. There is one h where another box covers the feet
+(`stseg.bodies.covered_feet`), and one elsewhere. They and the noise differ from detector to detector, and are learned
 (`stseg.noise.box_noise_estimate`).
 """
 
@@ -12,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Flags, Floats, Ints
 from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable, box_of, fill_discs, fill_levels
 from stseg.kernels.accelerate import kernel, part
 
@@ -142,8 +143,8 @@ SCORE_KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
 """Scores of the table; between them logarithms are interpolated."""
 
 
-HIDDEN_FEET = 0.2
-"""Share of boxes whose feet are hidden, before learning."""
+HIDDEN_FEET = np.array([0.1, 0.4])
+"""Shares of boxes whose feet are hidden, before learning: of those whose feet no other box covers, and of others."""
 
 
 @dataclass(frozen=True)
@@ -162,19 +163,22 @@ class BoxNoise:
 
     spread: Floats
     hidden_feet: Floats
-    """float64 (knot,): share of boxes whose feet are hidden, 0..1."""
+    """float64 (2,): shares of boxes whose feet are hidden, 0..1: where no other box covers them, and where one does."""
     scale: float = 1.0
     """Factor of offsets and tolerances: low, long bodies err by more of their height (`BodyConfig.stoutness`)."""
 
-    def of(self, score: Floats) -> tuple[Floats, Floats]:
-        """Boxes' tolerances float64 (box, 5), and what each says by itself, nats, float64 (box,); scores are 0..1."""
+    def of(self, score: Floats, covered: Flags) -> tuple[Floats, Floats]:
+        """Boxes' tolerances float64 (box, 5), and what each says by itself, nats, float64 (box,).
+
+        Scores are 0..1; `covered` bool (box,) says whether another box covers the feet.
+        """
         lower, share = knots_of(score)
-        logs = np.log(np.column_stack([self.spread, self.hidden_feet]))
-        *spread, hidden = np.exp(logs[lower] * (1 - share[:, None]) + logs[lower + 1] * share[:, None]).T
-        tolerance = np.column_stack(spread) / np.sqrt(EFFECTIVE_OBSERVATIONS)
-        odds = (1 - hidden) / (hidden * np.sqrt(2 * np.pi) * spread[LOWER_EDGE])
+        logs, kind = np.log(self.spread), covered.astype(int)
+        spread = np.exp(logs[lower] * (1 - share[:, None]) + logs[lower + 1] * share[:, None])
+        tolerance, hidden = spread / np.sqrt(EFFECTIVE_OBSERVATIONS), self.hidden_feet[kind]
+        odds = (1 - hidden) / (hidden * np.sqrt(2 * np.pi) * spread[:, LOWER_EDGE])
         limit = tolerance[:, LOWER_EDGE] * np.sqrt(np.log(np.maximum(odds, 1.0)))
-        sharpness = np.log(TOLERANCE / tolerance).sum(-1) + np.log((1 - hidden) / (1 - HIDDEN_FEET))
+        sharpness = np.log(TOLERANCE / tolerance).sum(-1) + np.log((1 - hidden) / (1 - HIDDEN_FEET[kind]))
         return np.column_stack([tolerance, limit]) * self.scale, EFFECTIVE_OBSERVATIONS * sharpness
 
 
@@ -185,7 +189,5 @@ def knots_of(score: Floats) -> tuple[np.ndarray, Floats]:
     return lower, at - lower
 
 
-PRIOR_NOISE = BoxNoise(
-    TOLERANCE * np.sqrt(EFFECTIVE_OBSERVATIONS / SCORE_KNOTS)[:, None], np.full(len(SCORE_KNOTS), HIDDEN_FEET)
-)
+PRIOR_NOISE = BoxNoise(TOLERANCE * np.sqrt(EFFECTIVE_OBSERVATIONS / SCORE_KNOTS)[:, None], HIDDEN_FEET)
 """Before anything is learned."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from stseg.arrays import AlignedBoxes, Boxes, Flags, Floats, Ints, Shorts, Singles
 from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, ViewBoxes, fill_inside
+from stseg.bodies.covered_feet import are_feet_covered
 from stseg.bodies.outlines import Pillars, Spans, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import WIDTH, BodyTable
@@ -155,7 +156,8 @@ class BoxView(View):
         corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
         right = boxes.right if isinstance(boxes, AlignedBoxes) else 0.0
-        return ViewObservation(edges, boxes.score, *noise.of(boxes.score), np.zeros((0, 0), np.float32), right)
+        sharpness = noise.of(boxes.score, are_feet_covered(edges))
+        return ViewObservation(edges, boxes.score, *sharpness, np.zeros((0, 0), np.float32), right)
 
     def boxes(self, observation: ViewObservation) -> ViewBoxes:
         """The frame's boxes, as kernels read them."""

@@ -12,9 +12,9 @@ lower edge counts by the probability that it is at the feet, with h / (1 - h) th
 
     p(hidden) / p(at the feet) = h / ((1 - h) N(r; 0, sigma^2)) = exp((r^2 - l^2) / t^2)
 
-where it ends r above the feet, with l the limit of `stseg.bodies.box_fit` and t^2 = 2 sigma^2; the mean of p(hidden) is
-h. People count for a view where the rest of the evidence supports them, and boxes at the border of the image, which are
-cut there, do not count.
+where it ends r above the feet, with l the limit of `stseg.bodies.box_fit` and t^2 = 2 sigma^2. The mean of p(hidden) is
+h, one of boxes whose feet another box covers, and one of all others. People count for a view where the rest of the
+evidence supports them, and boxes at the border of the image, which are cut there, do not count.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,6 +33,7 @@ from stseg.bodies.box_fit import (
     fill_offsets,
     knots_of,
 )
+from stseg.bodies.covered_feet import are_feet_covered
 from stseg.bodies.views import BoxView, View, ViewObservation, ViewObservations
 from stseg.config import ErrorRateConfig
 from stseg.noise.box_bias import whole_boxes
@@ -56,33 +57,34 @@ class BoxNoiseEstimate:
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig, scale: float = 1.0) -> None:
         self._config, self._scale = config, scale
-        self.offsets = Forgetting((len(SCORE_KNOTS), 2, FEET_LIMIT + 1), frame_rate, config.memory)
-        """(knot, 2, 5): degrees of freedom, and squared offsets; of the last, boxes, and those with hidden feet. All
-        are times seconds."""
+        self.offsets = Forgetting((len(SCORE_KNOTS), 2, FEET_LIMIT), frame_rate, config.memory)
+        """(knot, 2, 4): degrees of freedom, and squared offsets; both times seconds."""
+        self.feet = Forgetting((2, 2), frame_rate, config.memory)
+        """(covered, 2): boxes, and those whose feet are hidden; both times seconds."""
 
     @property
     def noise(self) -> BoxNoise:
         """The noise by all frames so far."""
-        first = np.column_stack([PRIOR_NOISE.spread**2, PRIOR_NOISE.hidden_feet])
-        counted = self.offsets.with_prior(self._config.prior_weight, np.stack([np.ones_like(first), first], 1))
-        mean = counted[:, 1] / counted[:, 0]
-        spread = np.sqrt(mean[:, :FEET_LIMIT])
+        first, weight = PRIOR_NOISE.spread**2, self._config.prior_weight
+        counted = self.offsets.with_prior(weight, np.stack([np.ones_like(first), first], 1))
+        spread = np.sqrt(counted[:, 1] / counted[:, 0])
         spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
-        return BoxNoise(spread, mean[:, FEET_LIMIT], self._scale)
+        boxes, hidden = self.feet.with_prior(weight, np.column_stack([np.ones(2), PRIOR_NOISE.hidden_feet])).T
+        return BoxNoise(spread, hidden / boxes, self._scale)
 
     def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count one frame."""
         self.offsets.forget()
+        self.feet.forget()
         for k, person, observation, box in explained_boxes(explanation, views, observations, self._config):
             edges, tolerance = observation.edges[box], observation.tolerance[box]
-            counted = _counted(views[k], explanation.people, person, edges, tolerance)
-            counted[:, 1, :FEET_LIMIT] /= self._scale**2
-            self._count(observation.score[box], counted)
-
-    def _count(self, score: Floats, counted: Floats) -> None:
-        lower, share = knots_of(score)
-        for knot, part in ((lower, 1 - share), (lower + 1, share)):
-            np.add.at(self.offsets.sums, knot, self.offsets.seconds(counted * part[:, None, None]))
+            counted, feet = _counted(views[k], explanation.people, person, edges, tolerance)
+            counted[:, 1] /= self._scale**2
+            covered = are_feet_covered(observation.edges)[box].astype(int)
+            np.add.at(self.feet.sums, covered, self.feet.seconds(feet))
+            lower, share = knots_of(observation.score[box])
+            for knot, part in ((lower, 1 - share), (lower + 1, share)):
+                np.add.at(self.offsets.sums, knot, self.offsets.seconds(counted * part[:, None, None]))
 
 
 def explained_boxes(
@@ -97,16 +99,16 @@ def explained_boxes(
             yield k, owner[box], observation, box
 
 
-def _counted(view: View, people: People, person: Ints, edges: Floats, tolerance: Floats) -> Floats:
-    """Shares of people's boxes in the sums, float64 (box, 2, 5)."""
+def _counted(view: View, people: People, person: Ints, edges: Floats, tolerance: Floats) -> tuple[Floats, Floats]:
+    """Shares of people's boxes in the sums of offsets, float64 (box, 2, 4), and of feet, float64 (box, 2)."""
     offsets = _offsets(view, people, person, edges)
     mean, variance = offsets.mean(0), offsets.var(0)
     freedom = np.maximum(1.0 - variance / tolerance[:, :FEET_LIMIT] ** 2, 0.0)
-    counted = np.stack([freedom, mean**2], 1)
     hidden = _hidden_feet(mean[:, LOWER_EDGE], tolerance)
+    feet = freedom[:, LOWER_EDGE, None] * np.column_stack([np.ones_like(hidden), hidden])
+    counted = np.stack([freedom, mean**2], 1)
     counted[..., LOWER_EDGE] *= (1.0 - hidden)[:, None]
-    of_feet = freedom[:, LOWER_EDGE, None] * np.column_stack([np.ones_like(hidden), hidden])
-    return np.asarray(np.nan_to_num(np.concatenate([counted, of_feet[..., None]], -1)))
+    return np.nan_to_num(counted), np.nan_to_num(feet)
 
 
 def _hidden_feet(offset: Floats, tolerance: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
 from stseg.bodies.box_fit import PRIOR_NOISE, BoxNoise, ViewBoxes
 from stseg.bodies.box_likelihood import box_likelihood
+from stseg.bodies.covered_feet import are_feet_covered
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable, inside_bodies
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, OccupancyConfig
@@ -250,7 +251,7 @@ class Occupancy:
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
-        boxes = ViewBoxes(edges, *noise.of(view.score), width, height)
+        boxes = ViewBoxes(edges, *noise.of(view.score, are_feet_covered(edges)), width, height)
         priors = self._log_height_around(np.array([self.height_mean]))[0], self._log_height_around(people.height)
         fit = CellFit.unfilled(len(self.heights), vicinity.near_person.size)
         fill_fit(pillars[1], pillars[0], *priors, boxes, owner, vicinity, fit)

@@ -24,6 +24,7 @@ from stseg.bodies.box_fit import (
     fill_match,
     half_square,
 )
+from stseg.bodies.covered_feet import are_feet_covered
 from stseg.bodies.outlines import Pillars, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable
@@ -37,7 +38,7 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.records.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
-TOLERANCE = PRIOR_NOISE.of(np.ones(1))[0][0]
+TOLERANCE = reference.PRIOR_TOLERANCE
 EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(2, 150)).map(
     lambda b: np.array([b[0], b[1], b[0] + b[2], b[1] + b[3]])
 )
@@ -64,7 +65,7 @@ def test_feet_far_above_are_hidden() -> None:
 def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     edges = np.array(found).reshape(-1, 4)
-    tolerance, belief = PRIOR_NOISE.of(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
+    tolerance, belief = PRIOR_NOISE.of(np.random.default_rng(seed).uniform(0.1, 1, len(edges)), are_feet_covered(edges))
     match, best = np.empty((len(bodies), len(edges))), np.full(len(bodies), -np.inf)
     boxes = ViewBoxes(edges, tolerance, belief, WIDTH, HEIGHT)
     fill_match(bodies, boxes, match)
@@ -89,7 +90,7 @@ def test_own_boxes_fit_as_they_match(seed: int) -> None:
     chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
     patch, heights = chance.uniform(-4, 4, (3, 2, 2)), chance.uniform(1.4, 2, (3, 4))
     edges, own, score = table.boxes_of(patch[:2, 0], heights[:2, 0]), np.array([1, -1, 0]), np.ones((3, 4, 2))
-    boxes = ViewBoxes(edges, *PRIOR_NOISE.of(chance.uniform(0.1, 1, 2)), WIDTH, HEIGHT)
+    boxes = ViewBoxes(edges, *PRIOR_NOISE.of(chance.uniform(0.1, 1, 2), are_feet_covered(edges)), WIDTH, HEIGHT)
     add_own_fits(table, patch, heights, own, boxes, -8.0, score)
     for j, k, place in np.ndindex(3, 4, 2):
         match = np.empty((1, 2))

@@ -14,7 +14,8 @@ from scipy.ndimage import maximum_filter
 
 from stseg.arrays import Boxes, Floats, Singles, ViewEvidence
 from stseg.bodies import box_fit
-from stseg.bodies.box_fit import FEET_LIMIT, HIDDEN_FEET, LOWER_EDGE, PRIOR_NOISE, TOLERANCE, WIDTH_OFFSET
+from stseg.bodies.box_fit import FEET_LIMIT, LOWER_EDGE, PRIOR_NOISE, TOLERANCE, WIDTH_OFFSET
+from stseg.bodies.covered_feet import are_feet_covered
 from stseg.bodies.views import ViewObservation
 from stseg.config import BodyConfig, Config, DetectionConfig, ErrorRateConfig
 from stseg.detection.detector import Detector
@@ -38,8 +39,8 @@ SHARP = replace(PRIOR_NOISE, spread=PRIOR_NOISE.spread / 4)
 @drawn(100, st.lists(st.floats(0, 1), max_size=5))
 def test_what_is_sharper_says_more(scores: list[float]) -> None:
     score = np.array(scores)
-    tolerance, belief = PRIOR_NOISE.of(score)
-    sharper, more = replace(PRIOR_NOISE, spread=PRIOR_NOISE.spread / 2).of(score)
+    tolerance, belief = PRIOR_NOISE.of(score, score > 2)
+    sharper, more = replace(PRIOR_NOISE, spread=PRIOR_NOISE.spread / 2).of(score, score > 2)
     np.testing.assert_allclose(sharper[:, :FEET_LIMIT], tolerance[:, :FEET_LIMIT] / 2)
     np.testing.assert_allclose(more - belief, 4 * box_fit.EFFECTIVE_OBSERVATIONS * np.log(2))
 
@@ -53,7 +54,7 @@ def test_noise_begins_at_the_prior_by_score_and_forgets() -> None:
     for _ in range(50):
         sharpening.offsets.forget()
     np.testing.assert_allclose(sharpening.noise.spread[-1], PRIOR_NOISE.spread[-1], rtol=1e-3)
-    tolerance, belief = PRIOR_NOISE.of(np.array([1.0, 0.6, 0.2]))
+    tolerance, belief = PRIOR_NOISE.of(np.array([1.0, 0.6, 0.2]), np.array([False, True, False]))
     np.testing.assert_allclose(tolerance[0, :FEET_LIMIT], TOLERANCE)
     np.testing.assert_allclose(belief, np.log([1.0, 0.6, 0.2]), atol=1e-12)
 
@@ -89,9 +90,17 @@ def test_the_spread_of_boxes_and_hidden_feet_are_found(spread: float, hidden: fl
     learned = sharpening.noise
     found = np.delete(learned.spread[-1], WIDTH_OFFSET) / spread
     assert ((found > 0.8) & (found < 1.25)).all()
-    assert learned.hidden_feet[-1] == pytest.approx(hidden, abs=0.05)
+    assert learned.hidden_feet[0] == pytest.approx(hidden, abs=0.05)
     np.testing.assert_allclose(learned.spread[:-2], PRIOR_NOISE.spread[:-2])
-    np.testing.assert_allclose(learned.hidden_feet[:-2], HIDDEN_FEET)
+
+
+def test_feet_are_covered_by_a_box_that_ends_lower() -> None:
+    """The first stands behind the second, not behind the third beside it, nor behind a box of the same person."""
+    edges = np.array([[10.0, 10, 30, 60], [15, 20, 40, 80], [32, 20, 60, 90], [11, 10, 31, 61]])
+    np.testing.assert_array_equal(are_feet_covered(edges), [True, False, False, True])
+    many = np.tile(edges, (600, 1))
+    np.testing.assert_array_equal(are_feet_covered(many), np.tile([True, False, False, True], 600))
+    assert are_feet_covered(np.zeros((0, 4))).shape == (0,)
 
 
 @pytest.mark.parametrize("views", [4, 2, 1])
@@ -242,8 +251,8 @@ def test_stout_bodies_are_tolerated_and_kept_in_the_rig() -> None:
         text = format_rig(recording(body), Path("rig.toml"))
         assert ("[body]" in text) == (body != BodyPrior()) and parse_rig(text, Path("rig.toml")).body == body
     score = np.array([0.3, 0.9])
-    stout = BoxNoiseEstimate(RATE, CONFIG, BodyConfig(height_mean=0.6, width_mean=0.42).stoutness).noise.of(score)
-    slim = BoxNoiseEstimate(RATE, CONFIG).noise.of(score)
+    low = BoxNoiseEstimate(RATE, CONFIG, BodyConfig(height_mean=0.6, width_mean=0.42).stoutness)
+    stout, slim = (one.noise.of(score, score > 2) for one in (low, BoxNoiseEstimate(RATE, CONFIG)))
     for of_stout, person, ratio in zip(stout, slim, (1.7 / 0.6, 1), strict=True):
         np.testing.assert_allclose(of_stout, ratio * person)
     assert BodyConfig().stoutness == BodyConfig().breadth == BodyConfig(width_mean=0.3).stoutness == 1.0

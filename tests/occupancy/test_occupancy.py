@@ -135,7 +135,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
     pillars, height = bodies.reshape(-1, 4).astype(np.float32), np.array([1.7, 1.6, 1.8])
     prior = -0.5 * ((tried - height[:, None]) / 0.1) ** 2
-    tolerance, _ = PRIOR_NOISE.of(np.ones(len(found)))
+    tolerance, _ = PRIOR_NOISE.of(np.ones(len(found)), np.zeros(len(found), bool))
     view = ViewBoxes(edges, tolerance, np.log(shaken.score), 128.0, 96.0)
     fit = CellFit.unfilled(3, 16)
     index, cells = PillarIndex.of(pillars, camera.size), Vicinity.of(near_person, 2)
