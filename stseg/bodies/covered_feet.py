@@ -8,7 +8,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats
 
 _LEAST_DEPTH = 0.05
-"""How much lower a nearer person's box ends at least, shares of the height of the box behind it."""
+"""Least distance by which a nearer person's box ends lower, shares of the height of the box behind it."""
 _AT_ONCE = 1000
 """Boxes that are compared with all others at once: a frame may have ten thousand."""
 
