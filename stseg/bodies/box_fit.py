@@ -22,8 +22,7 @@ MIDDLE_OFFSET, WIDTH_OFFSET, UPPER_EDGE, LOWER_EDGE, FEET_LIMIT = range(5)
 TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06])
 """Tolerances of the four in a box of score 1 before learning, shares of the body's height."""
 EDGE_GRAIN = 2.0 / TOLERANCE
-"""Pixels added to the height of which tolerances are shares: 2 pixels, since a sharper detector's grid is finer, too.
-"""
+"""Pixels added to the height of which tolerances are shares, for a grid of 2 pixels: a sharper detector's is finer."""
 MATCH_LIMIT = 4.5
 """Offsets of the middle beyond this many tolerances exclude a match."""
 LEAST_PIXEL_HEIGHT = 8.0
@@ -141,10 +140,8 @@ EFFECTIVE_OBSERVATIONS = 0.5
 """Effective number of observations of one edge of a box: errors of edges and views are correlated."""
 SCORE_KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
 """Scores of the table; between them logarithms are interpolated."""
-
-
 HIDDEN_FEET = np.array([0.1, 0.4])
-"""Shares of boxes whose feet are hidden, before learning: of those whose feet no other box covers, and of others."""
+"""Shares of boxes whose feet are hidden before learning: where no other box covers them, and where one does."""
 
 
 @dataclass(frozen=True)

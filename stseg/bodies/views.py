@@ -156,8 +156,8 @@ class BoxView(View):
         corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
         right = boxes.right if isinstance(boxes, AlignedBoxes) else 0.0
-        sharpness = noise.of(boxes.score, are_feet_covered(edges))
-        return ViewObservation(edges, boxes.score, *sharpness, np.zeros((0, 0), np.float32), right)
+        tolerance, belief = noise.of(boxes.score, are_feet_covered(edges))
+        return ViewObservation(edges, boxes.score, tolerance, belief, np.zeros((0, 0), np.float32), right)
 
     def boxes(self, observation: ViewObservation) -> ViewBoxes:
         """The frame's boxes, as kernels read them."""

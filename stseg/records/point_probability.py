@@ -9,7 +9,7 @@ from scipy.special import expit
 
 from stseg.arrays import Floats, Rows
 
-WRONG_SHARES = np.array([0.5, 0.45, 0.025, 0.007, 0.003, 0.001])
+WRONG_SHARES = np.array([0.5, 0.45, 0.025, 0.007, 0.005, 0.001])
 """Share of wrong points by the number of views, the last one for more: of choices of the cameras of six recordings."""
 
 
