@@ -7,8 +7,8 @@ off by e, the offsets of lower edges and of middles of boxes from a body of h pi
 
 with derivatives J, K by the place, and the noise of each box. Least squares without e leave normal equations of m and b
 (Schur complement), which say nothing by one view, or by views that look the same way. The errors of one box last for a
-second, so that the boxes of a second are one: equations of all people and frames add up in seconds, and are forgotten as
-all that is learned (`stseg.records.forgetting`). Boxes are corrected before they are observed, and offsets are those of
+second, so that the boxes of a second are one: equations of all people and frames add up in seconds, forgotten as all
+that is learned (`stseg.records.forgetting`). Boxes are corrected before they are observed, and offsets are those of
 boxes as they were delivered.
 
 All views have one m: what differs between them cannot be told from a ground that moved. The mean errors of heads cannot
