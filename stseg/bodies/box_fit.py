@@ -18,7 +18,7 @@ from stseg.bodies.pillars import LEVELS, PROFILE, BodyTable, box_of, fill_discs,
 from stseg.kernels.accelerate import kernel, part
 
 MIDDLE_OFFSET, WIDTH_OFFSET, UPPER_EDGE, LOWER_EDGE, FEET_LIMIT = range(5)
-"""Compared quantities of a box: middle, width, upper and lower edge; then how far above feet those are not hidden."""
+"""Compared quantities of a box: middle, width, upper and lower edge; and the offset above which feet are hidden."""
 TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06])
 """Tolerances of the four in a box of score 1 before learning, shares of the body's height."""
 EDGE_GRAIN = 2.0 / TOLERANCE
