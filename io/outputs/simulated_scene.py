@@ -14,65 +14,27 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO
 
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from stseg.arrays import Boxes, Bytes, Rows
+from stseg.arrays import Bytes
 from stseg.errors import OutputError
-from stseg.geometry import Camera, Rig
+from stseg.geometry import Camera
 from stseg.io.outputs.whole_files import clear_frames, marked_png, require_empty
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source, SourceKind
 from stseg.io.recording.rigs import write_rig
 from stseg.io.untrusted.bounded_files import is_regular
 from stseg.io.untrusted.values import require_utf8
+from stseg.simulation.film import SceneFilm
+from stseg.simulation.rendering.render import RenderedView
 
 _ANYBODY = BodyPrior()
 FrameProgress = Callable[[int, int], None]
 """Called after each frame with the number of finished frames and of all frames."""
-
-
-class SimulatedView(Protocol):
-    """One camera's frame: image uint8 (v, u, 3) BGR, instances uint16 (v, u), a detector's boxes, mask uint8 (v, u)."""
-
-    @property
-    def image(self) -> Bytes: ...
-    @property
-    def instances(self) -> NDArray[np.uint16]: ...
-    @property
-    def boxes(self) -> Boxes: ...
-    @property
-    def mask(self) -> Bytes: ...
-
-
-class SimulatedFrame(Protocol):
-    """One frame of all cameras: its number, the truth as rows of frame, id, x, y, height, the views."""
-
-    @property
-    def frame(self) -> int: ...
-    @property
-    def truth(self) -> Rows: ...
-    @property
-    def views(self) -> tuple[SimulatedView, ...]: ...
-
-
-class SimulatedScene(Protocol):
-    """A scene that can be filmed, see `stseg.simulation.SceneFilm`."""
-
-    @property
-    def rig(self) -> Rig: ...
-    @property
-    def frames(self) -> int: ...
-    @property
-    def kinds(self) -> tuple[SourceKind, ...]: ...
-    @property
-    def quality(self) -> int: ...
-    def empty(self) -> Iterator[tuple[Bytes, ...]]: ...
-    def frame_sets(self) -> Iterator[SimulatedFrame]: ...
 
 
 _SCENE = "stseg-scene"
@@ -81,7 +43,7 @@ _SCENE = "stseg-scene"
 
 def write_scene(
     folder: Path,
-    scene: SimulatedScene,
+    scene: SceneFilm,
     *,
     body: BodyPrior = _ANYBODY,
     instances: bool = False,
@@ -105,7 +67,7 @@ def write_scene(
             (folder / _SCENE).touch()
         if links := [path.name for path in folder.iterdir() if path.is_symlink()]:
             raise OutputError(folder, "", f"{links[0]}, a link", "no links, which would be written through")
-        if "video" in scene.kinds:
+        if "video" in scene.spec.kinds:
             _write_empty(folder, scene)
         with ExitStack() as open_files:
             truth = open_files.enter_context((folder / "truth.csv").open("w", encoding="utf-8"))
@@ -118,7 +80,7 @@ def write_scene(
                 for film, view in zip(films, frame_set.views, strict=True):
                     film.write(frame_set.frame, view)
                 if progress is not None:
-                    progress(done, scene.frames)
+                    progress(done, scene.spec.frames)
     # Last: a rig file promises that its sources exist.
     _write_rigs(folder, scene, body, instances)
 
@@ -151,7 +113,7 @@ class _Video:
 class _CameraFiles(AbstractContextManager["_CameraFiles"]):
     """The output files of one camera."""
 
-    def __init__(self, folder: Path, camera: Camera, scene: SimulatedScene, instances: bool) -> None:
+    def __init__(self, folder: Path, camera: Camera, scene: SceneFilm, instances: bool) -> None:
         rate, paths = scene.rig.frame_rate, _paths(folder, camera)
         self._instances: Path | None = paths["instances"] if instances else None
         if self._instances is not None:
@@ -160,14 +122,14 @@ class _CameraFiles(AbstractContextManager["_CameraFiles"]):
             self._boxes: IO[str] = stack.enter_context(paths["boxes"].open("w", encoding="utf-8"))
             self._videos = dict[str, _Video]()
             for kind in ("video", "masks"):
-                if kind in scene.kinds:
-                    quality = scene.quality if kind == "video" else None
+                if kind in scene.spec.kinds:
+                    quality = scene.spec.quality if kind == "video" else None
                     self._videos[kind] = _Video(paths[kind], camera, rate, quality)
                     stack.callback(self._videos[kind].close)
             self._boxes.write("frame,left,top,width,height,score\n")
             self._stack = stack.pop_all()
 
-    def write(self, frame: int, view: SimulatedView) -> None:
+    def write(self, frame: int, view: RenderedView) -> None:
         """Write one frame."""
         for kind, video in self._videos.items():
             video.write(view.image if kind == "video" else view.mask)
@@ -181,23 +143,23 @@ class _CameraFiles(AbstractContextManager["_CameraFiles"]):
         self._stack.close()
 
 
-def _write_empty(folder: Path, scene: SimulatedScene) -> None:
+def _write_empty(folder: Path, scene: SceneFilm) -> None:
     """Films of the scene without people."""
     with ExitStack() as stack:
         videos = []
         for camera in scene.rig.cameras:
-            videos.append(_Video(_paths(folder, camera)["empty"], camera, scene.rig.frame_rate, scene.quality))
+            videos.append(_Video(_paths(folder, camera)["empty"], camera, scene.rig.frame_rate, scene.spec.quality))
             stack.callback(videos[-1].close)
         for images in scene.empty():
             for video, image in zip(videos, images, strict=True):
                 video.write(image)
 
 
-def _write_rigs(folder: Path, scene: SimulatedScene, body: BodyPrior, instances: bool) -> None:
-    kinds: tuple[SourceKind, ...] = (*scene.kinds, *(("instances",) if instances else ()))
+def _write_rigs(folder: Path, scene: SceneFilm, body: BodyPrior, instances: bool) -> None:
+    kinds: tuple[SourceKind, ...] = (*scene.spec.kinds, *(("instances",) if instances else ()))
     for kind in kinds:
         path = folder / rig_name(kind)
-        sources = tuple(_source(folder, camera, kind, scene.frames) for camera in scene.rig.cameras)
+        sources = tuple(_source(folder, camera, kind, scene.spec.frames) for camera in scene.rig.cameras)
         write_rig(path, Recording(path, scene.rig, sources, body), overwrite=True)
 
 
@@ -206,10 +168,10 @@ def rig_name(kind: SourceKind) -> str:
     return "rig.toml" if kind == "video" else f"rig_{kind}.toml"
 
 
-def _outputs(folder: Path, scene: SimulatedScene) -> Iterator[Path]:
+def _outputs(folder: Path, scene: SceneFilm) -> Iterator[Path]:
     """Every file and folder that a scene may write."""
     yield folder / "truth.csv"
-    for kind in (*scene.kinds, "instances"):
+    for kind in (*scene.spec.kinds, "instances"):
         yield folder / rig_name(kind)
     for camera in scene.rig.cameras:
         yield from _paths(folder, camera).values()

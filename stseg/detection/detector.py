@@ -116,7 +116,7 @@ class Detector:
     ) -> Explanation:
         """Explain one frame as `explain_next`, by first guesses alone: of a session that has learned nothing."""
         evidence = self.evidence(self.observe(views), self._prior(predicted, self.body))
-        return explained_frame(self._search.whole(self._search.of_tracks(evidence), proposals))
+        return explained_frame(self._search.of_frame(self._search.of_tracks(evidence), proposals))
 
     def explain_next(
         self,
@@ -181,7 +181,7 @@ class Detector:
             explanation = followed_frame(tracks, self._search)
             if explanation is not None:
                 return explanation, False
-        estimate = self._search.whole(tracks, proposals)
+        estimate = self._search.of_frame(tracks, proposals)
         if is_key and predicted is not None and len(weak_members(estimate)):
             untracked = evidence.under(self._prior(None, evidence.prior.body))
             people = self._search.without_tracks(untracked, estimate)

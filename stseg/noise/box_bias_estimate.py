@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, ViewEvidence
+from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
 from stseg.bodies.box_fit import EDGE_GRAIN, LEAST_PIXEL_HEIGHT, LOWER_EDGE, MIDDLE_OFFSET, fill_offsets
 from stseg.bodies.views import View, ViewObservations
 from stseg.config import ErrorRateConfig
@@ -88,6 +88,8 @@ class BoxBiasEstimate:
 
     def corrected(self, evidence: Sequence[ViewEvidence], sizes: Sequence[tuple[int, int]]) -> list[ViewEvidence]:
         """The evidence of the next frame by the mean errors so far; see `BoxBias.corrected`."""
+        if not any(isinstance(view, Boxes) for view in evidence):
+            return list(evidence)
         self._corrected = self._errors
         return self.bias.corrected(evidence, sizes)
 

@@ -12,7 +12,7 @@ from stseg.simulation.crowd.social_forces import walk_freely
 from stseg.simulation.rendering.body import pose, upright_cylinders
 from stseg.simulation.rendering.cameras import build_rig, turns
 from stseg.simulation.rendering.render import RenderedView, Viewer
-from stseg.simulation.scene import Kind, SceneSpec
+from stseg.simulation.scene import SceneSpec
 from stseg.simulation.spoiling.errors import Moment
 from stseg.simulation.spoiling.spoil import Spoil, body_width, spoiled_boxes, spoiled_mask
 
@@ -48,21 +48,6 @@ class SceneFilm:
         self.rig: Rig = build_rig(spec)
         """Its cameras and grid."""
         self.viewers = [Viewer(spec, *place) for place in zip(self.rig.cameras, turns(spec), strict=True)]
-
-    @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return self.spec.frames
-
-    @property
-    def kinds(self) -> tuple[Kind, ...]:
-        """Kinds of foreground that are written."""
-        return self.spec.kinds
-
-    @property
-    def quality(self) -> int:
-        """JPEG quality of the frames, 1..100."""
-        return self.spec.quality
 
     def empty(self) -> Iterator[tuple[Bytes, ...]]:
         """Frames of the empty room, one uint8 (v, u, 3) a camera, from the time before the first frame."""

@@ -77,7 +77,7 @@ def simulate(
         raise ConfigError("command line", "--scene", repr(scene), one_of(scene, NAMED))
     errors, folder = [_spoil(text) for text in spoil], Path(folder)
     film = SceneFilm(replace(NAMED[scene], **given), errors)
-    with reporter_of(progress).progress("filming", film.frames) as advance:
+    with reporter_of(progress).progress("filming", film.spec.frames) as advance:
         write_scene(
             folder,
             film,
@@ -87,7 +87,7 @@ def simulate(
             progress=lambda _done, _total: advance(1),
         )
     return SimulatedRecording(
-        folder / rig_name(film.kinds[0]), folder / "truth.csv", film.frames, len(film.rig.cameras)
+        folder / rig_name(film.spec.kinds[0]), folder / "truth.csv", film.spec.frames, len(film.rig.cameras)
     )
 
 

@@ -91,5 +91,5 @@ def test_a_small_crowd_is_tracked_through_middle_errors(kind: str) -> None:
         truth.append(frame_set.truth)
         results += tracker.add([view.mask for view in frame_set.views])
     rows = tracker.tracks(results + tracker.finish()).trajectory
-    moda = evaluate(np.concatenate(truth), rows, frames=np.arange(film.frames)).moda
+    moda = evaluate(np.concatenate(truth), rows, frames=np.arange(film.spec.frames)).moda
     assert moda is not None and moda >= 99.0

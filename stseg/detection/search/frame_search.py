@@ -47,13 +47,43 @@ class FrameSearch:
         tracks = evidence.prior.pool()
         return MapEstimate.of_search(evidence, tracks, np.arange(len(tracks)))
 
-    def whole(
-        self, estimate: MapEstimate, proposals: Candidates | None = None, ground: OpenGround = EVERYWHERE
-    ) -> MapEstimate:
-        """All rounds, from an estimate on; proposals join the lattice in the first one.
+    def of_frame(self, tracks: MapEstimate, proposals: Candidates | None = None) -> MapEstimate:
+        """The search of a whole frame, from its tracks on: all rounds, by boxes restarts, and the final search."""
+        searched = self._rounds(tracks, proposals, EVERYWHERE)
+        return self._final(restarted(searched, self.lattice_ground) if self.has_boxes else searched, EVERYWHERE)
+
+    def whole(self, estimate: MapEstimate, ground: OpenGround = EVERYWHERE) -> MapEstimate:
+        """All rounds, from an estimate on, and the final search, without restarts.
 
         People join, move and leave on open ground alone, by default everywhere.
         """
+        return self._final(self._rounds(estimate, None, ground), ground)
+
+    def without_tracks(self, untracked: FrameEvidence, estimate: MapEstimate) -> Candidates:
+        """The people of a search with the track prior removed (`untracked`), about weak members of an estimate.
+
+        The others stand as they are, if they are the most.
+        """
+        weak = estimate.pool.ground[estimate.members[weak_members(estimate)]]
+        ground = OpenGround(weak, _WEAK_REACH)
+        strong = np.delete(estimate.members, ground.members_of(estimate))
+        if 2 * len(strong) <= len(estimate.members):
+            strong, ground = strong[:0], EVERYWHERE
+        start = MapEstimate.of_search(untracked, estimate.pool.at(strong), np.arange(len(strong)))
+        result = self.whole(start, ground)
+        return result.pool.at(result.members)
+
+    def repeated(self, estimate: MapEstimate, start: Candidates) -> MapEstimate:
+        """Repeat the search from people of a search without tracks.
+
+        With few views many sets are better than all that exchange one or two members, and tracks lead into one of them.
+        """
+        evidence = estimate.evidence
+        pool = start.joined_with(evidence.prior.pool()).joined_with(estimate.pool.at(estimate.members))
+        return self._final(merged(MapEstimate.of_search(evidence, pool, np.arange(len(start)))), EVERYWHERE)
+
+    def _rounds(self, estimate: MapEstimate, proposals: Candidates | None, ground: OpenGround) -> MapEstimate:
+        """The rounds, until one changes nobody; proposals join the lattice in the first one."""
         is_open = ground.covers(self.lattice_ground.reshape(-1, 2)).reshape(self.lattice_ground.shape[:2])
         for _ in range(self.rounds):
             more = lattice_candidates(estimate, self.lattice_ground, is_open).new_to(estimate.pool)
@@ -70,32 +100,9 @@ class FrameSearch:
             if (searched.members < number).all():
                 break
             is_unmerged = len(estimate.members) == len(searched.members)
-            if is_unmerged and not self.has_boxes and _same_people(estimate.members, before, number, open_members):
+            if is_unmerged and _same_people(estimate.members, before, number, open_members):
                 break
-        return self._final(estimate, ground)
-
-    def without_tracks(self, untracked: FrameEvidence, estimate: MapEstimate) -> Candidates:
-        """The people of a search with the track prior removed (`untracked`), about weak members of an estimate.
-
-        The others stand as they are, if they are the most.
-        """
-        weak = estimate.pool.ground[estimate.members[weak_members(estimate)]]
-        ground = OpenGround(weak, _WEAK_REACH)
-        strong = np.delete(estimate.members, ground.members_of(estimate))
-        if 2 * len(strong) <= len(estimate.members):
-            strong, ground = strong[:0], EVERYWHERE
-        start = MapEstimate.of_search(untracked, estimate.pool.at(strong), np.arange(len(strong)))
-        result = self.whole(start, None, ground)
-        return result.pool.at(result.members)
-
-    def repeated(self, estimate: MapEstimate, start: Candidates) -> MapEstimate:
-        """Repeat the search from people of a search without tracks.
-
-        With few views many sets are better than all that exchange one or two members, and tracks lead into one of them.
-        """
-        evidence = estimate.evidence
-        pool = start.joined_with(evidence.prior.pool()).joined_with(estimate.pool.at(estimate.members))
-        return self._final(merged(MapEstimate.of_search(evidence, pool, np.arange(len(start)))), EVERYWHERE)
+        return estimate
 
     def _moved(self, estimate: MapEstimate, chosen: Ints) -> Candidates:
         """Some members, int64 (k,) counted from 0, nearer to where they stand: a step between two searches.
@@ -112,8 +119,6 @@ class FrameSearch:
         refined = self._moved(estimate, chosen)
         start = np.concatenate([np.delete(estimate.members, chosen), np.arange(number, number + len(refined))])
         moved = estimate.searched_with(refined, start)
-        if self.has_boxes:
-            moved = restarted(moved, self.lattice_ground)
         rejected = moved.best_rejected()
         rejected = rejected[ground.covers(moved.pool.ground[rejected])]
         pool = moved.pool.at(np.concatenate([moved.members, rejected]))
