@@ -28,7 +28,7 @@ def followed_alternative(
 ) -> Alternative:
     """The reading of a frame by alternative tracks, those of the evidence `followed`, beside its explanation."""
     tracks = search.of_tracks(followed)
-    other = followed_frame(tracks, search) or explained_frame(search.whole(tracks))
+    other = followed_frame(tracks, search) or explained_frame(search.without_restarts.whole(tracks))
     gain = likelihood_gain(untracked, explanation.people.candidates, other.people.candidates)
     return Alternative(other, gain)
 

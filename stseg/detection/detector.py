@@ -39,6 +39,8 @@ from stseg.records.predicted_tracks import PredictedTracks
 from stseg.view_health.reprojection_residuals import nearest_people, reprojection_residuals
 from stseg.view_health.view_failures import ViewFailures
 
+_RESTARTS = 3
+"""Restarts of the search of one frame by boxes, at most."""
 _FIRST_FRAME_SEARCHES = 2
 """Searches of a session's first frame from which its rims are learned: the second finds who was missed by the first."""
 
@@ -88,8 +90,8 @@ class Detector:
         self.border = Border.of(rig)
         self._key_interval = key_frame_interval(rig.frame_rate, config)
         self._has_boxes = "boxes" in kinds
-        swap_sweeps = 0 if self._has_boxes else config.swap_moves
-        self._search = FrameSearch(self.lattice_ground, self._has_boxes, config.search_rounds, swap_sweeps)
+        swap_sweeps, restarts = (0, _RESTARTS) if self._has_boxes else (config.swap_moves, 0)
+        self._search = FrameSearch(self.lattice_ground, self._has_boxes, config.search_rounds, swap_sweeps, restarts)
 
     def new_estimates(self) -> Estimates:
         """Estimates of a session that begins: first guesses, the configured population, and no view that fails."""
@@ -116,7 +118,7 @@ class Detector:
     ) -> Explanation:
         """Explain one frame as `explain_next`, by first guesses alone: of a session that has learned nothing."""
         evidence = self.evidence(self.observe(views), self._prior(predicted, self.body))
-        return explained_frame(self._search.of_frame(self._search.of_tracks(evidence), proposals))
+        return explained_frame(self._search.whole(self._search.of_tracks(evidence), proposals))
 
     def explain_next(
         self,
@@ -181,7 +183,7 @@ class Detector:
             explanation = followed_frame(tracks, self._search)
             if explanation is not None:
                 return explanation, False
-        estimate = self._search.of_frame(tracks, proposals)
+        estimate = self._search.whole(tracks, proposals)
         if is_key and predicted is not None and len(weak_members(estimate)):
             untracked = evidence.under(self._prior(None, evidence.prior.body))
             people = self._search.without_tracks(untracked, estimate)

@@ -85,7 +85,7 @@ def searched_beside(
     start = np.concatenate([np.arange(number), number + np.flatnonzero(is_open)])
     estimate = MapEstimate.of_search(tracks.evidence, pool, start)
     for _ in range(_SEARCH_LIMIT):
-        estimate = search.whole(estimate, ground)
+        estimate = search.whole(estimate, None, ground)
         member, is_sure = _members_of(followed, estimate)
         if is_sure.all():
             return _explained(estimate, member, followed.people)

@@ -1,7 +1,8 @@
 """Short gaps of tracks are filled by linear interpolation, and places smoothed (Rauch, Tung and Striebel 1965).
 
-The motion model is that of the track filter; each row is a measurement with its own covariance C = L L'. Most of its
-error lasts (`stseg.noise.lasting_error`): it is L u with a state u of its own, x, y, vx, vy, u1, u2 in all, where
+The motion model is that of the track filter; each row is a measurement with its own covariance C = L L', except for
+those of filled gaps, which are predicted, with nan as raw_x and raw_y. Most of a measurement's error lasts
+(`stseg.noise.lasting_error`): it is L u with a state u of its own, x, y, vx, vy, u1, u2 in all, where
 
     u' = r u + N(0, (1 - r^2) I),  r = exp(-t / tau),    measured place = place + sqrt(b^2) L u + N(0, a^2 C)
 
@@ -42,8 +43,8 @@ def filled_gaps(trajectory: Rows, interpolated: Rows) -> Rows:
 def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
     """TRAJECTORY rows in gaps of at most `tracking.interpolation_gap`.
 
-    They have extent 0, no sizes, and a covariance that grows with the time to the nearest detection. Longer gaps stay
-    open: the path there is unknown.
+    They have extent 0, no measured place or size, and a covariance that grows with the time to the nearest detection.
+    Longer gaps stay open: the path there is unknown.
     """
     order = np.lexsort((trajectory["frame"], trajectory["id"]))
     step, same = np.diff(trajectory["frame"][order]), np.diff(trajectory["id"][order]) == 0
@@ -69,12 +70,13 @@ def _between(before: np.void, after: np.void, frame_rate: float) -> Rows:
     filled = np.zeros(len(frames), TRAJECTORY)
     fraction = (frames - before["frame"]) / (after["frame"] - before["frame"])
     filled["frame"], filled["id"] = frames, before["id"]
-    for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "score"):
+    for name in ("x", "y", "xx", "xy", "yy", "score"):
         filled[name] = before[name] + fraction * (after[name] - before[name])
     away = np.minimum(frames - before["frame"], after["frame"] - frames) / frame_rate
     filled["xx"] += (DRIFT_SPEED * away) ** 2
     filled["yy"] += (DRIFT_SPEED * away) ** 2
-    filled["height"] = filled["width"] = np.nan
+    for name in ("raw_x", "raw_y", "height", "width"):
+        filled[name] = np.nan
     filled["views"] = before["views"]
     return filled
 
@@ -82,7 +84,7 @@ def _between(before: np.void, after: np.void, frame_rate: float) -> Rows:
 def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> None:
     """Smooth x, y and their covariance in TRAJECTORY rows (n,), sorted by frame.
 
-    The columns raw_x and raw_y stay the detection's.
+    The columns raw_x and raw_y stay the detection's; where they are nan, the place is predicted.
     """
     if not len(trajectory):
         return
@@ -155,6 +157,7 @@ def _filtered(
     motion, turn = _motions(seconds[first:] - seconds[before], model)
     matrix, white = _measurement(noise), PLACE_ERROR.white * noise
     state, spread = np.zeros((len(seconds), 6, 1)), np.zeros((len(seconds), 6, 6))
+    is_measured, ground = np.isfinite(ground[:, 0, 0]), np.nan_to_num(ground)
     if begun is None:
         state[:first, :2], spread[:first] = ground[:first], _first_spread(noise[:first], matrix[:first], model)
     else:
@@ -165,7 +168,7 @@ def _filtered(
         predicted[new] = rows @ state[old]
         ahead[new] = rows @ spread[old] @ rows.transpose(0, 2, 1) + turn[new.start - first : new.stop - first]
         crossed = ahead[new] @ matrix[new].transpose(0, 2, 1)
-        gain = crossed @ np.linalg.inv(matrix[new] @ crossed + white[new])
+        gain = crossed @ np.linalg.inv(matrix[new] @ crossed + white[new]) * is_measured[new, None, None]
         state[new] = predicted[new] + gain @ (ground[new] - matrix[new] @ predicted[new])
         spread[new] = ahead[new] - gain @ matrix[new] @ ahead[new]
     return (state, spread), (predicted, ahead), motion

@@ -309,7 +309,7 @@ def test_key_frames_leave_the_set_of_misplaced_tracks(seed: int) -> None:
 def test_no_set_becomes_less_likely(seed: int) -> None:
     _, views, predicted = box_crowd(seed)
     before = of_tracks(views, predicted)
-    after = restarted(before, box_detector().lattice_ground)
+    after = restarted(before, box_detector().lattice_ground, 3)
     assert after.total >= before.total
 
 
@@ -362,4 +362,4 @@ def test_more_candidates_have_the_pixels_of_a_whole_pool() -> None:
 def test_strong_members_are_not_searched_again() -> None:
     views = [boxes(camera, people((-1, -1), (1, 1))) for camera in room().cameras]
     before = of_tracks(views, expecting((-1, -1), (1, 1)))
-    assert (before.losses > 12).all() and restarted(before, box_detector().lattice_ground) is before
+    assert (before.losses > 12).all() and restarted(before, box_detector().lattice_ground, 3) is before

@@ -34,7 +34,7 @@ def _unrevised(_: object, frames: Sequence[TrackedFrame], first: int, stop: int)
 
 
 WHOLE: dict[str, tuple[str, Any]] = {
-    "restart": (f"{_SEARCH}.restarted", lambda estimate, _: estimate),
+    "restart": (f"{_SEARCH}.restarted", lambda estimate, *_: estimate),
     "searched afresh": (f"{_DETECTOR}.weak_members", lambda _: ()),
     "alternatives": (f"{_DETECTOR}.found_alternative", lambda *_: None),
     "merging": (f"{_SEARCH}.merged", lambda estimate, *_: estimate),

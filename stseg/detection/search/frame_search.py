@@ -5,7 +5,9 @@ are found once those are. After each round the set is searched again, until a ro
 search, rejected candidates that were nearly accepted are fitted to their pixels (docs/how-it-works.md, Detection).
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,49 +43,26 @@ class FrameSearch:
     """Rounds of candidates, at most."""
     swap_sweeps: int
     """Sweeps of swap moves in the final search, at most."""
+    restarts: int
+    """Restarts in the final search, at most."""
+
+    @property
+    def without_restarts(self) -> FrameSearch:
+        """The same search without restarts, for one that begins without weak members, or of an alternative."""
+        return replace(self, restarts=0)
 
     def of_tracks(self, evidence: FrameEvidence) -> MapEstimate:
         """The best set of the predicted tracks alone."""
         tracks = evidence.prior.pool()
         return MapEstimate.of_search(evidence, tracks, np.arange(len(tracks)))
 
-    def of_frame(self, tracks: MapEstimate, proposals: Candidates | None = None) -> MapEstimate:
-        """The search of a whole frame, from its tracks on: all rounds, by boxes restarts, and the final search."""
-        searched = self._rounds(tracks, proposals, EVERYWHERE)
-        return self._final(restarted(searched, self.lattice_ground) if self.has_boxes else searched, EVERYWHERE)
-
-    def whole(self, estimate: MapEstimate, ground: OpenGround = EVERYWHERE) -> MapEstimate:
-        """All rounds, from an estimate on, and the final search, without restarts.
+    def whole(
+        self, estimate: MapEstimate, proposals: Candidates | None = None, ground: OpenGround = EVERYWHERE
+    ) -> MapEstimate:
+        """All rounds, from an estimate on; proposals join the lattice in the first one.
 
         People join, move and leave on open ground alone, by default everywhere.
         """
-        return self._final(self._rounds(estimate, None, ground), ground)
-
-    def without_tracks(self, untracked: FrameEvidence, estimate: MapEstimate) -> Candidates:
-        """The people of a search with the track prior removed (`untracked`), about weak members of an estimate.
-
-        The others stand as they are, if they are the most.
-        """
-        weak = estimate.pool.ground[estimate.members[weak_members(estimate)]]
-        ground = OpenGround(weak, _WEAK_REACH)
-        strong = np.delete(estimate.members, ground.members_of(estimate))
-        if 2 * len(strong) <= len(estimate.members):
-            strong, ground = strong[:0], EVERYWHERE
-        start = MapEstimate.of_search(untracked, estimate.pool.at(strong), np.arange(len(strong)))
-        result = self.whole(start, ground)
-        return result.pool.at(result.members)
-
-    def repeated(self, estimate: MapEstimate, start: Candidates) -> MapEstimate:
-        """Repeat the search from people of a search without tracks.
-
-        With few views many sets are better than all that exchange one or two members, and tracks lead into one of them.
-        """
-        evidence = estimate.evidence
-        pool = start.joined_with(evidence.prior.pool()).joined_with(estimate.pool.at(estimate.members))
-        return self._final(merged(MapEstimate.of_search(evidence, pool, np.arange(len(start)))), EVERYWHERE)
-
-    def _rounds(self, estimate: MapEstimate, proposals: Candidates | None, ground: OpenGround) -> MapEstimate:
-        """The rounds, until one changes nobody; proposals join the lattice in the first one."""
         is_open = ground.covers(self.lattice_ground.reshape(-1, 2)).reshape(self.lattice_ground.shape[:2])
         for _ in range(self.rounds):
             more = lattice_candidates(estimate, self.lattice_ground, is_open).new_to(estimate.pool)
@@ -102,7 +81,31 @@ class FrameSearch:
             is_unmerged = len(estimate.members) == len(searched.members)
             if is_unmerged and _same_people(estimate.members, before, number, open_members):
                 break
-        return estimate
+        return self._final(estimate, ground)
+
+    def without_tracks(self, untracked: FrameEvidence, estimate: MapEstimate) -> Candidates:
+        """The people of a search with the track prior removed (`untracked`), about weak members of an estimate.
+
+        The others stand as they are, if they are the most.
+        """
+        weak = estimate.pool.ground[estimate.members[weak_members(estimate)]]
+        ground = OpenGround(weak, _WEAK_REACH)
+        strong = np.delete(estimate.members, ground.members_of(estimate))
+        if 2 * len(strong) <= len(estimate.members):
+            strong, ground = strong[:0], EVERYWHERE
+        start = MapEstimate.of_search(untracked, estimate.pool.at(strong), np.arange(len(strong)))
+        result = self.without_restarts.whole(start, None, ground)
+        return result.pool.at(result.members)
+
+    def repeated(self, estimate: MapEstimate, start: Candidates) -> MapEstimate:
+        """Repeat the search from people of a search without tracks.
+
+        With few views many sets are better than all that exchange one or two members, and tracks lead into one of them.
+        """
+        evidence = estimate.evidence
+        pool = start.joined_with(evidence.prior.pool()).joined_with(estimate.pool.at(estimate.members))
+        begun = MapEstimate.of_search(evidence, pool, np.arange(len(start)))
+        return self.without_restarts._final(merged(begun), EVERYWHERE)
 
     def _moved(self, estimate: MapEstimate, chosen: Ints) -> Candidates:
         """Some members, int64 (k,) counted from 0, nearer to where they stand: a step between two searches.
@@ -119,6 +122,7 @@ class FrameSearch:
         refined = self._moved(estimate, chosen)
         start = np.concatenate([np.delete(estimate.members, chosen), np.arange(number, number + len(refined))])
         moved = estimate.searched_with(refined, start)
+        moved = restarted(moved, self.lattice_ground, self.restarts)
         rejected = moved.best_rejected()
         rejected = rejected[ground.covers(moved.pool.ground[rejected])]
         pool = moved.pool.at(np.concatenate([moved.members, rejected]))

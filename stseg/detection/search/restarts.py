@@ -16,16 +16,14 @@ _REMOVAL_MARGIN = 12.0
 """Members are removed before a restart if that lowers the score by less, nats."""
 _MINIMUM_GAIN = 1.0
 """Least rise of the score for which another set is taken, nats: less is a matter of the members' exact places."""
-_RESTART_LIMIT = 3
-"""Restarts of one frame at most."""
 
 
-def restarted(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
+def restarted(estimate: MapEstimate, lattice_ground: Floats, restarts: int) -> MapEstimate:
     """The estimate of a search, or a better one that was found from its strong members alone.
 
-    `lattice_ground` float64 (y, x, 2) is the birth lattice, metres.
+    `lattice_ground` float64 (y, x, 2) is the birth lattice, metres; `restarts` are made at most.
     """
-    for _ in range(_RESTART_LIMIT):
+    for _ in range(restarts):
         trial = better_of(estimate, _from_strong_members(estimate, lattice_ground))
         if trial is estimate:
             break
