@@ -121,7 +121,7 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
         ("views", ", ".join(ground)),
         ("frames", f"{o.frames}{span}; {o.seconds:.1f} s at {o.frame_rate:g} frames/s"),
         ("people", f"{o.people_mean:.1f} a frame, at most {o.people_most}{_minutes(o.people_per_minute)}"),
-        ("tracks", str(len(o.tracks)) + lengths),
+        ("tracks", f"{len(o.tracks)}{lengths}; {100 * o.filled_points:.1f} % of their points predicted in gaps"),
         ("events", event_counts_text(o.events) or "none"),
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
         ("ghosts", "; ".join(f"{count} because {words}" for words, count in ranked if count) or "none"),

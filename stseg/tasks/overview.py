@@ -37,6 +37,8 @@ class Overview:
     """Rows of /tracks, the longest first."""
     track_seconds: dict[str, float]
     """Shortest, median and longest."""
+    filled_points: float
+    """Share of the points of tracks that are predicted in a gap, 0..1."""
     events: dict[str, int]
     candidates_per_frame: float
     ghosts_per_frame: float
@@ -82,6 +84,7 @@ def summarise_run(run: Run) -> Overview:
         people_per_minute=people_per_minute(run.frames, run.trajectory, run.frame_rate).tolist(),
         tracks=_tracks(run),
         track_seconds=_track_seconds(run),
+        filled_points=per(np.isnan(run.trajectory["raw_x"]).sum(), len(run.trajectory)),
         events={name.decode(): int(number) for name, number in zip(kinds.tolist(), counts, strict=True)},
         candidates_per_frame=per(len(ghosts), count),
         ghosts_per_frame=per(ghosts.sum(), count),

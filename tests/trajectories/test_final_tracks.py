@@ -56,6 +56,8 @@ def test_long_gaps_and_raw_places_stay() -> None:
     assert short.trajectory["frame"].tolist() == list(range(52))
     filled = np.isin(short.trajectory["frame"], range(24, 28))
     assert (short.trajectory["extent"] > 0).tolist() == (~filled).tolist()
+    assert np.isnan(short.trajectory["raw_x"]).tolist() == np.isnan(short.trajectory["raw_y"]).tolist() == filled.tolist()
+    assert short.trajectory["xx"][filled].min() > short.trajectory["xx"][10:20].max()
     rows = committed(rows_of({3: (visit(1), 1.7, range(60))}, noise=0.1))
     found = whole(rows, events_of()).trajectory
     np.testing.assert_array_equal(found["raw_x"], rows["x"])
@@ -185,6 +187,17 @@ def test_covariances_without_full_rank_are_smoothed(yy: float, xy: float) -> Non
     places, spread = smoothed(np.arange(4), ground, noise, SMOOTHER_RATE, np.ones(4, np.int64))
     assert np.isfinite(places).all() and np.isfinite(spread).all()
     np.testing.assert_allclose(places, ground, atol=0.1)
+
+
+def test_predicted_rows_of_gaps_are_no_measurements() -> None:
+    rows = committed(gone(0.5))
+    filled = whole(rows, events_of()).trajectory
+    measured = np.isfinite(filled["raw_x"])
+    alone = rows[np.argsort(rows["frame"])]
+    alone["id"] = 1
+    smooth_places(alone, RATE, MOTION)
+    for name in ("x", "y", "xx", "xy", "yy"):
+        np.testing.assert_allclose(filled[name][measured], alone[name], rtol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(3))
