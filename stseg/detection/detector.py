@@ -88,8 +88,8 @@ class Detector:
         core = config.minimum_distance - CORE_MARGIN if "pixels" in kinds else 0.0
         self.parameters = ScoreParameters.of(config, core, body.width_mean)
         self.border = Border.of(rig)
-        self._key_interval = key_frame_interval(rig.frame_rate, config)
         self._has_boxes = "boxes" in kinds
+        self._key_interval = key_frame_interval(rig.frame_rate, config, self._has_boxes)
         swap_sweeps, restarts = (0, _RESTARTS) if self._has_boxes else (config.swap_moves, 0)
         self._search = FrameSearch(self.lattice_ground, self._has_boxes, config.search_rounds, swap_sweeps, restarts)
 
@@ -184,7 +184,7 @@ class Detector:
             if explanation is not None:
                 return explanation, False
         estimate = self._search.whole(tracks, proposals)
-        if is_key and predicted is not None and len(weak_members(estimate)):
+        if (is_key or self._has_boxes) and predicted is not None and len(weak_members(estimate)):
             untracked = evidence.under(self._prior(None, evidence.prior.body))
             people = self._search.without_tracks(untracked, estimate)
             estimate = better_of(estimate, self._search.repeated(estimate, people))

@@ -31,13 +31,16 @@ from stseg.geometry.distances import distances
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
 
+_BOX_INTERVAL = 0.2
+"""Greatest interval of key frames by boxes, seconds: people who are followed may exchange single boxes meanwhile."""
 _FITTING_GAIN = 3.0
 """Most that a candidate gains where its place and size are fitted to its pixels, nats: those of spoiled silhouettes."""
 
 
-def key_frame_interval(frame_rate: float, config: DetectionConfig) -> int:
+def key_frame_interval(frame_rate: float, config: DetectionConfig, has_boxes: bool) -> int:
     """Frames from one key frame to the next; it divides the numbers of key frames."""
-    return max(int(config.key_frame_interval * frame_rate), 1)
+    seconds = min(config.key_frame_interval, _BOX_INTERVAL) if has_boxes else config.key_frame_interval
+    return max(int(seconds * frame_rate), 1)
 
 
 def followed_frame(tracks: MapEstimate, search: FrameSearch) -> Explanation | None:

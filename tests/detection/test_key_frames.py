@@ -44,7 +44,9 @@ def is_searched(explanation: Explanation) -> bool:
 
 @cases()
 def test_no_more_time_passes_between_key_frames_than_is_asked(rate: float, longest: float, frames: int) -> None:
-    assert key_frame_interval(rate, replace(FEW_HEIGHTS, key_frame_interval=longest)) == frames
+    config = replace(FEW_HEIGHTS, key_frame_interval=longest)
+    assert key_frame_interval(rate, config, False) == frames
+    assert key_frame_interval(rate, config, True) == min(frames, max(int(rate / 5), 1))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -102,7 +104,7 @@ def test_an_empty_room_stays_empty() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_walkers_are_followed_as_by_searches(kind: str) -> None:
-    truth, detector_of_kind = walkers(24), detector(kind)
+    truth, detector_of_kind, first = walkers(24), detector(kind), {"pixels": 10, "boxes": 4}[kind]
     follow, learned = TrackFilter(RATE, CONFIG), detector_of_kind.new_estimates()
     names, searched = set[int](), 0
     for frame in range(24):
@@ -110,7 +112,7 @@ def test_walkers_are_followed_as_by_searches(kind: str) -> None:
         answer = detector_of_kind.explain_next(learned, frame, show(kind, standing), follow.predict(frame))
         names |= set(follow.update(frame, answer.people, answer.ghosts).tolist())
         searched += is_searched(answer)
-        assert searched == frame + 1 or frame >= 10
+        assert searched == frame + 1 or frame >= first
         away = np.hypot(*(answer.people.ground[:, None] - standing[:, :2]).transpose(2, 0, 1))
         assert away.shape == (3, 3) and away.min(0).max() < 0.12
     assert len(names) == 3 and 3 <= searched < 16
