@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Bytes, Flags, Floats, Ints, Rows, by_track, ground_of
-from stseg.records.point_probability import point_probability
 
 DOUBT_LIMIT = 0.9
 """Probability below which a point is doubtful."""
@@ -42,10 +41,10 @@ class DoubtfulStretch(NamedTuple):
     """Mean probability of its points, 0..1."""
 
 
-def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
-    """Mean probability of the points of each of `tracks`, float64 (n,), 0..1; nan for a track without points."""
+def mean_certainty(trajectory: Rows, probability: Floats, tracks: Rows) -> Floats:
+    """Mean probability (point,) of the points of each of `tracks`, float64 (n,), 0..1; nan for one without points."""
     ids, place = np.unique(trajectory["id"], return_inverse=True)
-    sums, counts = np.bincount(place, point_probability(trajectory), len(ids)), np.bincount(place, minlength=len(ids))
+    sums, counts = np.bincount(place, probability, len(ids)), np.bincount(place, minlength=len(ids))
     means = dict(zip(ids.tolist(), (sums / np.maximum(counts, 1)).tolist(), strict=True))
     return np.array([means.get(int(track), np.nan) for track in tracks["id"]])
 
@@ -69,10 +68,10 @@ def exchange_chances(trajectory: Rows, tracks: Rows, frame_rate: float, border: 
     return np.asarray(-np.expm1(-rate), float)
 
 
-def doubtful_stretches(trajectory: Rows) -> list[DoubtfulStretch]:
-    """Stretches of doubtful points, by track and frame."""
-    rows = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    probability = point_probability(rows)
+def doubtful_stretches(trajectory: Rows, probability: Floats) -> list[DoubtfulStretch]:
+    """Stretches of doubtful points by the probability (point,) of each, by track and frame."""
+    order = np.lexsort((trajectory["frame"], trajectory["id"]))
+    rows, probability = trajectory[order], probability[order]
     doubtful = np.flatnonzero(probability < DOUBT_LIMIT)
     breaks = (np.diff(rows["id"][doubtful]) != 0) | (np.diff(rows["frame"][doubtful]) > 1)
     pieces = np.split(doubtful, np.flatnonzero(breaks) + 1) if len(doubtful) else []

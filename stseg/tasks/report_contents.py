@@ -10,6 +10,7 @@ from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
 from stseg.measures.motion import flow_field
 from stseg.records.ghost_reasons import GhostReasons, ghost_reasons, has_evidence
+from stseg.records.point_probability import point_probability
 from stseg.reporting.charts import clock_time
 from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
 from stseg.reporting.page.answers import answers
@@ -58,6 +59,7 @@ def page_contents(
         warnings=run.warnings,
         span=span,
         trajectory=trajectory,
+        probability=point_probability(trajectory, [one.source.kind for one in run.recording.sources]),
         tracks=run.tracks,
         exchange_chances=exchange_chances(trajectory, run.tracks, run.frame_rate, np.array([rig.grid.x, rig.grid.y]).T),
         events=run.events,

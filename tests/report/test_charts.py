@@ -58,12 +58,15 @@ def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
     rows = trajectory_of(*((frame, track, 0, 0) for track in (1, 2) for frame in range(10)), (30, 2, 0, 0))
     rows["score"], rows["views"] = 8.0, 9
     rows["score"][[3, 4, 7, 12, 20]] = 0.0
-    found = run_statistics.doubtful_stretches(rows[::-1])
+    probability = point_probability(rows, ["masks"])
+    found = run_statistics.doubtful_stretches(rows[::-1], probability[::-1])
     assert [(one.track, one.first, one.last) for one in found] == [(1, 3, 4), (1, 7, 7), (2, 2, 2), (2, 30, 30)]
     assert [one.certainty for one in found] == pytest.approx([0.5] * 4, rel=2e-3)
     tracks = table_of(TRACK, id=(1, 2, 3), last=(9, 30, 5))
     np.testing.assert_allclose(
-        run_statistics.mean_certainty(rows, tracks), 0.999 * np.array([0.85, 1 - 1 / 11, np.nan]), atol=1e-3
+        run_statistics.mean_certainty(rows, probability, tracks),
+        0.999 * np.array([0.85, 1 - 1 / 11, np.nan]),
+        atol=1e-3,
     )
     svg = track_chart(run_statistics.Span(0, 40, 5.0), tracks, found)
     assert svg.count('class="pale"') == 4 and "track 1, frames 3 to 4: 50 % certain" in svg
@@ -72,7 +75,9 @@ def test_doubtful_points_are_stretches_and_pale_in_the_bar() -> None:
 def test_few_views_ends_and_absence_make_points_less_certain() -> None:
     rows = trajectory_of(*((frame, 1, 0, 0) for frame in range(8)))
     rows["score"], rows["views"] = 50.0, np.arange(8)
-    certain = point_probability(rows)
+    certain = point_probability(rows, ["boxes", "video"])
+    by_boxes = point_probability(rows, ["boxes"])
+    assert by_boxes[2] > certain[2] and (by_boxes >= certain).all()
     assert (np.diff(certain) >= 0).all()
     assert certain[1] < 0.6 < 0.9 < certain[2] < 0.98 < 0.99 < certain[7] < 1
     walks = [(frame, track, x, 0.0) for track, x in ((1, 3.0), (2, 8.0)) for frame in range(40)]

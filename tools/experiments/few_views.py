@@ -50,10 +50,12 @@ def run(one: ResultSet, bench: Bench, cameras: Cameras, seed: int) -> list[float
     """MODA, IDF1, and the shares of points that are wrong, and that are stated to be, percent, of a perturbed run."""
     rows = final_rows(tracked(one, bench, Config(), seed, cameras))
     scores = scored(one, bench, rows)
-    x0, y0, x1, y1 = scored_area(one, read_recording(bench.path(one.rig)).rig)
+    recording = read_recording(bench.path(one.rig))
+    x0, y0, x1, y1 = scored_area(one, recording.rig)
     rows = rows[(rows["x"] >= x0) & (rows["x"] <= x1) & (rows["y"] >= y0) & (rows["y"] <= y1)]
     right = 100.0 if scores.precision is None else scores.precision
-    return [scores.moda or 0.0, scores.idf1, 100.0 - right, 100.0 * (1 - point_probability(rows).mean())]
+    probability = point_probability(rows, [source.source.kind for source in recording.sources])
+    return [scores.moda or 0.0, scores.idf1, 100.0 - right, 100.0 * (1 - probability.mean())]
 
 
 def line(name: str, chosen: Sequence[Cameras], found: Floats) -> list[object]:

@@ -42,6 +42,8 @@ class Contents:
     """The frames of the run."""
     trajectory: Rows
     """TRAJECTORY (n,)."""
+    probability: Floats
+    """float64 (n,): probability of a person at each point, 0..1."""
     tracks: Rows
     """TRACK (m,)."""
     exchange_chances: Floats
@@ -99,6 +101,7 @@ def report_page(contents: Contents) -> str:
 
 def _sections(contents: Contents) -> list[str]:
     span, tracks = contents.span, contents.tracks
+    doubtful = doubtful_stretches(contents.trajectory, contents.probability)
     answers = "".join(f"<h3>{escape(question)}</h3><p>{answer}</p>" for question, answer in contents.answers)
     view_heads = "".join(f"<th>{escape(summary.name)}</th>" for summary in contents.view_summaries)
     counted = "people in each frame" + ("" if contents.truth is None else "; dashed: the truth")
@@ -118,7 +121,7 @@ def _sections(contents: Contents) -> list[str]:
         section(
             "Tracks",
             chart(
-                track_chart(span, tracks, doubtful_stretches(contents.trajectory), contents.names),
+                track_chart(span, tracks, doubtful, contents.names),
                 f"from first frame to last; pale where a person is less than {100 * DOUBT_LIMIT:.0f} % certain",
             ),
             _track_table(contents),
@@ -235,7 +238,7 @@ def _view_summaries(view_summaries: Sequence[ViewSummary]) -> str:
 
 def _track_table(contents: Contents) -> str:
     span, tracks, names = contents.span, contents.tracks, contents.names
-    certainty = mean_certainty(contents.trajectory, tracks)
+    certainty = mean_certainty(contents.trajectory, contents.probability, tracks)
     rows = [
         (
             swatch(int(row["id"]), names.get(int(row["id"]), "")),
