@@ -33,10 +33,6 @@ from stseg.simulation.film import SceneFilm
 from stseg.simulation.rendering.render import RenderedView
 
 _ANYBODY = BodyPrior()
-FrameProgress = Callable[[int, int], None]
-"""Called after each frame with the number of finished frames and of all frames."""
-
-
 _SCENE = "stseg-scene"
 """Name of the empty file by which the folder of a scene is known."""
 
@@ -48,13 +44,13 @@ def write_scene(
     body: BodyPrior = _ANYBODY,
     instances: bool = False,
     overwrite: bool = False,
-    progress: FrameProgress | None = None,
+    frame_done: Callable[[], object] = lambda: None,
 ) -> None:
     """Film a scene into a folder, which is made if it does not exist.
 
     `body` is what the rig files say of the bodies. With `instances` there are instance images, too, one file a camera
-    and frame; with `overwrite` the folder need not be empty, and files of an older scene are replaced. `progress` is
-    called after each frame. OutputError where the folder holds something already, or cannot be written to.
+    and frame; with `overwrite` the folder need not be empty, and files of an older scene are replaced. `frame_done`
+    is called after each frame. OutputError where the folder holds something already, or cannot be written to.
     """
     require_utf8(folder, "a video")
     require_empty(folder, overwrite)
@@ -75,12 +71,11 @@ def write_scene(
             films = [
                 open_files.enter_context(_CameraFiles(folder, camera, scene, instances)) for camera in scene.rig.cameras
             ]
-            for done, frame_set in enumerate(scene.frame_sets(), start=1):
+            for frame_set in scene.frame_sets():
                 np.savetxt(truth, frame_set.truth, fmt="%d,%d,%.4f,%.4f,%.3f")
                 for film, view in zip(films, frame_set.views, strict=True):
                     film.write(frame_set.frame, view)
-                if progress is not None:
-                    progress(done, scene.spec.frames)
+                frame_done()
     # Last: a rig file promises that its sources exist.
     _write_rigs(folder, scene, body, instances)
 
@@ -171,8 +166,8 @@ def rig_name(kind: SourceKind) -> str:
 def _outputs(folder: Path, scene: SceneFilm) -> Iterator[Path]:
     """Every file and folder that a scene may write."""
     yield folder / "truth.csv"
-    for kind in (*scene.spec.kinds, "instances"):
-        yield folder / rig_name(kind)
+    kinds: tuple[SourceKind, ...] = (*scene.spec.kinds, "instances")
+    yield from (folder / rig_name(kind) for kind in kinds)
     for camera in scene.rig.cameras:
         yield from _paths(folder, camera).values()
 

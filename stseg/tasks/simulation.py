@@ -84,7 +84,7 @@ def simulate(
             body=_body(film.spec),
             instances=instances,
             overwrite=overwrite,
-            progress=lambda _done, _total: advance(1),
+            frame_done=lambda: advance(1),
         )
     return SimulatedRecording(
         folder / rig_name(film.spec.kinds[0]), folder / "truth.csv", film.spec.frames, len(film.rig.cameras)

@@ -87,7 +87,9 @@ def final_tracks(
 
     People of earlier recordings keep their ids; all others have greater ones.
     """
-    bridged, track = _bridged(rows.trajectory, frame_rate, config.tracking)
+    committed = rows.trajectory
+    bridged, track = bridged_rows(committed, frame_rate, config.tracking), committed["id"].copy()
+    del committed
     problem = IdentityProblem.of(bridged, rows.appearance_parts, frame_rate, border, config, constraints)
     linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
@@ -127,11 +129,6 @@ def _with_returns(whole: FinalTracks, returns: Sequence[Return], frame_rate: flo
     trajectory = renamed_trajectory(whole.trajectory, returns)
     events = renamed_events(whole.events, trajectory, returns, frame_rate)
     return FinalTracks(trajectory, events, renamed_ids(whole.identity, returns))
-
-
-def _bridged(committed: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Rows, Ints]:
-    """As `bridged_rows`, with the track of each committed row."""
-    return bridged_rows(committed, frame_rate, config), committed["id"].copy()
 
 
 def bridged_rows(committed: Rows, frame_rate: float, config: TrackingConfig) -> Rows:

@@ -42,9 +42,8 @@ def at(ground: Floats) -> RefinedPlaces:
 
 def open_to_one(*views: Flags) -> EvidenceAssignment:
     """Of a single person, the pixels that are open to them in each view."""
-    return EvidenceAssignment.of_all(
-        np.full((len(views), 1), -1), [np.where(pixels, -1, 1).astype(np.int16) for pixels in views]
-    )
+    owners = [np.where(pixels, -1, 1).astype(np.int16) for pixels in views]
+    return EvidenceAssignment(np.full((len(views), 1), -1), owners, np.zeros(1, np.int64))
 
 
 @drawn(100, VALUES)

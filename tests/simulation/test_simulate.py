@@ -342,8 +342,8 @@ def test_detectors_miss_shake_guess_and_see_ghosts() -> None:
 def test_a_written_scene_reads_back(tmp_path: Path) -> None:
     spec = replace(TINY, seconds=0.4, quality=95)
     film, reported = SceneFilm(spec), []
-    write_scene(tmp_path / "a", film, instances=True, progress=lambda done, of: reported.append((done, of)))
-    assert reported == [(k, 4) for k in range(1, 5)]
+    write_scene(tmp_path / "a", film, instances=True, frame_done=lambda: reported.append(1))
+    assert len(reported) == 4
     moments = list(film.frame_sets())
     names = ("rig", "rig_masks", "rig_boxes", "rig_instances")
     recordings = [read_recording(tmp_path / "a" / f"{name}.toml") for name in names]

@@ -288,11 +288,10 @@ def test_short_gaps_are_filled_on_straight_lines(first: set[int], second: set[in
         gaps = [range(a + 1, b) for a, b in pairwise(sorted(frames))]
         short = [f for gap in gaps if len(gap) <= CONFIG.interpolation_gap * RATE for f in gap]
         assert own["frame"].tolist() == sorted([*frames, *short])
-        for x, y in (("x", "y"), ("raw_x", "raw_y")):
-            np.testing.assert_allclose(
-                np.column_stack([own[x], own[y]]), [whole[i][f] for f in own["frame"]], atol=1e-9
-            )
+        walked = np.column_stack([own["x"], own["y"]])
+        np.testing.assert_allclose(walked, [whole[i][f] for f in own["frame"]], atol=1e-9)
         unseen = ~np.isin(own["frame"], list(frames))
+        assert (np.isnan(own["raw_x"]) == unseen).all() and (np.isnan(own["raw_y"]) == unseen).all()
         assert (own["xx"][unseen] > 0.01).all() and (own["xx"][~unseen] == 0.01).all()
         assert (np.isnan(own["height"]) == unseen).all() and np.isnan(own["width"][unseen]).all()
     keys = [(row["frame"], row["id"]) for row in filled]

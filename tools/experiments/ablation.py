@@ -39,7 +39,7 @@ WHOLE: dict[str, tuple[str, Any]] = {
     "alternatives": (f"{_DETECTOR}.found_alternative", lambda *_: None),
     "merging": (f"{_SEARCH}.merged", lambda estimate, *_: estimate),
     "fitted alternatives": (f"{_SEARCH}._fitted", lambda estimate, others: estimate.pool.at(others[:0])),
-    "swaps": (f"{_DETECTOR}.FrameSearch", lambda ground, boxes, rounds, _: FrameSearch(ground, boxes, rounds, 0)),
+    "swaps": (f"{_DETECTOR}.FrameSearch", lambda a, b, c, _, d: FrameSearch(a, b, c, 0, d)),
     "key frames": (f"{_DETECTOR}.key_frame_interval", lambda *_: 1),
     "rim": ("stseg.noise.rim_estimate.RimEstimate.applied", lambda _, views: list(views)),
     "blob scale": ("stseg.detection.frame_evidence.blob_scales", lambda rasters, *_: np.zeros_like(rasters)),

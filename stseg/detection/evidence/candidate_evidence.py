@@ -75,7 +75,8 @@ def box_evidence(
         (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
     ]
     if not chosen:
-        return _no_boxes(bodies.edges.shape[1])
+        none = np.zeros((0, bodies.edges.shape[1]))
+        return BoxEvidence(none[..., None][..., :0], np.zeros(0, np.int64), no_rows(), none)
     sizes = np.array([view.camera.size for view, _ in chosen], float)
     boxes = np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64)
     candidates, first = bodies.edges.shape[1], 0 if base is None else base.inside.shape[1]
@@ -92,11 +93,6 @@ def box_evidence(
     before = base.occluders if base else no_rows()
     occluders = occluders_of(bodies.edges, bodies.distance, sizes, is_blind, before, first)
     return BoxEvidence(match, boxes, occluders, inside)
-
-
-def _no_boxes(candidates: int) -> BoxEvidence:
-    """Evidence where no view delivers boxes."""
-    return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_rows(), np.zeros((0, candidates)))
 
 
 def stacked_rasters(views: Sequence[View], of_views: Sequence[Singles | None]) -> Singles:

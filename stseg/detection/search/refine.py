@@ -40,11 +40,6 @@ class EvidenceAssignment:
     number: Ints
     """int64 (person,): the number of each, by which pixels name them; others have numbers, too."""
 
-    @classmethod
-    def of_all(cls, box: Ints, pixels: Sequence[Shorts]) -> EvidenceAssignment:
-        """The assignment to people who are numbered as they stand."""
-        return cls(box, pixels, np.arange(box.shape[1]))
-
     def at(self, chosen: Ints) -> EvidenceAssignment:
         """That to the chosen, int64 (k,)."""
         return EvidenceAssignment(self.box[:, chosen], self.pixels, self.number[chosen])

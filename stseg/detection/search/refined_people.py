@@ -53,13 +53,9 @@ def moved_members(estimate: MapEstimate, chosen: Ints) -> Candidates:
 
 def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
     """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
-    if chosen is None:
-        assignment = EvidenceAssignment.of_all(estimate.member_boxes, estimate.pixel_assignment)
-        return _refined(estimate, estimate.pool.at(estimate.members), assignment, estimate.track_index)
-    members = estimate.members[chosen]
-    score = estimate.additions(members)
-    assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, chosen)
-    return _refined(estimate, estimate.pool.at(members), assignment, score.track_index)
+    chosen = np.arange(len(estimate.members)) if chosen is None else chosen
+    start = estimate.pool.at(estimate.members[chosen])
+    return _refined(estimate, start, _assignment(estimate, chosen), estimate.track_index[chosen])
 
 
 def followed_members(estimate: MapEstimate, chosen: Ints, start: Candidates) -> RefinedPeople:
