@@ -60,11 +60,6 @@ class FrameEvidence:
         return {}
 
     @cached_property
-    def lattice_peaks(self) -> dict[bytes, Candidates]:
-        """Candidates of the birth lattice by the boxes that were free, as `birth_lattice` found them in this frame."""
-        return {}
-
-    @cached_property
     def scales(self) -> Singles:
         """Scales of their pixels (`stseg.detection.evidence.blob_scale`)."""
         return blob_scales(self.rasters, self.extremes, self.lattice, self.prior.config, self.prior.body)

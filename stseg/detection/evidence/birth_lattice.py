@@ -27,20 +27,8 @@ def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats, is_open: F
     """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
 
     `lattice_ground` float64 (y, x, 2) is that of the views, metres; `is_open` bool (y, x) where peaks may lie, by
-    default everywhere. By boxes alone, peaks are found once for the same free boxes: rounds often end with these.
+    default everywhere. Pixels are summed at one or two heights first, and at the others where those score well.
     """
-    evidence = estimate.evidence
-    if len(evidence.rasters):
-        return _new_peaks(estimate, lattice_ground, is_open)
-    free = [(member < 0).tobytes() for member in estimate.box_assignment]
-    name = b"".join([*free, b"" if is_open is None or is_open.all() else is_open.tobytes()])
-    if name not in evidence.lattice_peaks:
-        evidence.lattice_peaks[name] = _new_peaks(estimate, lattice_ground, is_open)
-    return evidence.lattice_peaks[name]
-
-
-def _new_peaks(estimate: MapEstimate, lattice_ground: Floats, is_open: Flags | None) -> Candidates:
-    """The same, found anew; pixels are summed at one or two heights first, and at the others where those score well."""
     evidence = estimate.evidence
     prior, (rows, columns) = evidence.prior, lattice_ground.shape[:2]
     heights = np.asarray(prior.body.heights)
