@@ -18,6 +18,9 @@ from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.filter.prediction import DetectionHistory
 
+_SURE = 3.0
+"""Log-odds above which a candidate is sure, nats: 20 to 1."""
+
 
 @dataclass(frozen=True)
 class TrackedFrame:
@@ -90,9 +93,10 @@ def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
 def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> Ints:
     """Track of each candidate that is real, 0 for the others: added ones take that of the next detection on their path.
 
-    A candidate is added between two of the detector's people, and before the first of a path away from the border,
-    where no person appears. Elsewhere candidates are the best of many places that were tried, and so are their sums:
-    a path of them alone is nobody. What prolongs a track at the border of the area costs nothing.
+    A candidate is added between two of the detector's people, and before the first of a path: away from the border,
+    where no person appears, or if it is sure. One view may see a person enter before others do. Elsewhere candidates
+    are the best of many places that were tried, and so are their sums: a path of them alone is nobody. What prolongs a
+    track at the border of the area costs nothing.
     """
     detected = np.where(decision.real, found.track, 0)
     linked = np.flatnonzero((decision.successor >= 0) & decision.real)
@@ -102,7 +106,7 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
         _take_over(earlier, int(decision.successor[i]), i, found)
     for i in linked[::-1].tolist():
         _take_over(later, i, int(decision.successor[i]), found)
-    return np.where((earlier > 0) | inside, later, 0)
+    return np.where((earlier > 0) | inside | (decision.log_odds > _SURE), later, 0)
 
 
 def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:
