@@ -43,11 +43,6 @@ class ViewObservation:
     """float64 (box,), or one for all: how far boxes were moved to the right (`AlignedBoxes`), pixels."""
 
     @cached_property
-    def is_foreground(self) -> Flags:
-        """Raster pixels that are foreground rather than not, bool (v, u)."""
-        return np.asarray(self.raster > 0)
-
-    @cached_property
     def extremes(self) -> tuple[float, float]:
         """The lowest and the highest log-odds, nats."""
         return float(self.raster.min(initial=np.inf)), float(self.raster.max(initial=-np.inf))
@@ -188,7 +183,7 @@ class PixelView(View):
 
     def foreground(self, observation: ViewObservation) -> Flags:
         """Raster pixels that are foreground rather than not, bool (v, u)."""
-        return observation.is_foreground
+        return np.asarray(observation.raster > 0)
 
     def open_sums(self, values: Singles, owner: Shorts, number: Ints, pillars: TriedPillars) -> tuple[Floats, Floats]:
         """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.

@@ -18,7 +18,7 @@ from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.filter.prediction import DetectionHistory
 
-_SURE = 3.0
+_LEAST_LOG_ODDS = 3.0
 """Log-odds above which a candidate is sure, nats: 20 to 1."""
 
 
@@ -106,7 +106,7 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
         _take_over(earlier, int(decision.successor[i]), i, found)
     for i in linked[::-1].tolist():
         _take_over(later, i, int(decision.successor[i]), found)
-    return np.where((earlier > 0) | inside | (decision.log_odds > _SURE), later, 0)
+    return np.where((earlier > 0) | inside | (decision.log_odds > _LEAST_LOG_ODDS), later, 0)
 
 
 def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:

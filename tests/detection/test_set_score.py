@@ -9,9 +9,8 @@ from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Floats, Ints
 from stseg.bodies.outlines import paint_outlines
-from stseg.detection.score.exchanges import fill_rises
 from stseg.detection.score.gains import gain
-from stseg.detection.score.moves import add, fill_gains, put, release, remove, return_to, withdraw
+from stseg.detection.score.moves import add, fill_gains, fill_rises, put, release, remove, return_to, withdraw
 from stseg.detection.score.set_state import Kept, SetState, set_state
 from stseg.detection.score.track_state import assign_track, release_track, track_gain, track_state
 from stseg.kernels.accelerate import COMPILED, kernel

@@ -3,7 +3,7 @@
 The work of a move is that of its neighbourhood.
 """
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.problem import DetectionProblem, RaggedArray
 from stseg.detection.score.box_state import link, list_members
 from stseg.detection.score.gains import fill_evidence, gain
@@ -163,5 +163,28 @@ def fill_gains(
         tracks[k] = fill_evidence(i, state, view_evidence[:, k], boxes[:, k])
         if is_member:
             put(i, place, state)
+    release(state)
+    whole.size[0] = 0  # held by name until here (`pointed`)
+
+
+@kernel
+def fill_rises(members: Ints, leaving: Flags, joining: Ints, problem: DetectionProblem, rises: Floats) -> None:
+    """Fill rises float64 (k,): by how much one exchange each raises the score of the members, int64 (n,), nats.
+
+    In exchange k the members leave that `leaving` bool (k, candidate) marks, and candidate `joining[k]` joins, int64
+    (k,).
+    """
+    whole = set_state(problem)
+    state = pointed(whole)
+    for i in members:
+        put(i, state.size[0], state)
+    for k in range(len(joining)):
+        before = copy_of(state)
+        for a in range(state.size[0] - 1, -1, -1):
+            if leaving[k, state.members[a]]:
+                remove(a, state)
+        add(joining[k], state.size[0], state)
+        rises[k] = state.total[0] - before.values[0]
+        return_to(before, state)
     release(state)
     whole.size[0] = 0  # held by name until here (`pointed`)

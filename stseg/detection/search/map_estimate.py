@@ -17,8 +17,7 @@ from stseg.bodies.views import BoxView, PixelView
 from stseg.detection.evidence.candidate_evidence import ProjectedBodies
 from stseg.detection.frame_evidence import FrameEvidence
 from stseg.detection.problem import DetectionProblem
-from stseg.detection.score.exchanges import fill_rises
-from stseg.detection.score.moves import fill_gains, score_of
+from stseg.detection.score.moves import fill_gains, fill_rises, score_of
 from stseg.detection.search.best_set import GAIN_LIMIT, find_best_set
 from stseg.kernels.accelerate import kernel
 from stseg.records.candidates import Candidates
@@ -118,7 +117,7 @@ class MapEstimate:
         return Additions(gains, evidence[order], tracks, box[order])
 
     def rises(self, leaving: Flags, joining: Ints) -> Floats:
-        """Rise of the score by each exchange, float64 (k,), nats: see `stseg.detection.score.exchanges`."""
+        """Rise of the score by each exchange, float64 (k,), nats: see `stseg.detection.score.moves`."""
         rises = np.empty(len(joining))
         fill_rises(self.members, leaving, joining, self.problem, rises)
         return rises
