@@ -53,9 +53,10 @@ def moved_members(estimate: MapEstimate, chosen: Ints) -> Candidates:
 
 def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
     """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
+    score = estimate.members_score if chosen is None else estimate.additions(estimate.members[chosen])
     chosen = np.arange(len(estimate.members)) if chosen is None else chosen
-    start = estimate.pool.at(estimate.members[chosen])
-    return _refined(estimate, start, _assignment(estimate, chosen), estimate.track_index[chosen])
+    assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, chosen)
+    return _refined(estimate, estimate.pool.at(estimate.members[chosen]), assignment, score.track_index)
 
 
 def followed_members(estimate: MapEstimate, chosen: Ints, start: Candidates) -> RefinedPeople:
