@@ -88,7 +88,7 @@ def test_cells_are_filled_in_doubt_or_a_half_where_uncounted() -> None:
 
 def test_of_a_run_file(tmp_path: Path) -> None:
     run = read_run(write_small_run(tmp_path / "night.h5"))
-    probability, log_odds = run.cell_reliability.of_cells(run.read_frame(12)[0]), small_volume()[0][2]
+    probability, log_odds = run.read_cell_probability(12), small_volume()[0][2]
     np.testing.assert_array_equal(np.isnan(probability), np.isnan(log_odds))
     seen = ~np.isnan(log_odds)
     order = np.argsort(log_odds[seen])

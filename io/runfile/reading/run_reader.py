@@ -302,6 +302,14 @@ class Run:
         """Reliability of the volume's log-odds, measured by the run's own tracks."""
         return learn_reliability(self)
 
+    def read_cell_probability(self, frame: int) -> Singles:
+        """Probability that a body fills each cell of one frame, float32 (plane, y, x), NaN where no view sees the cell.
+
+        Calibrated: of the cells with 0.8, 80 % are filled. Cells alone are judged; labels know of their neighbours,
+        and of other frames.
+        """
+        return self.cell_reliability.of_cells(self.read_frame(frame)[0])
+
     def read_packed_frames(self, field: layout.Field) -> Iterator[PackedFrames]:
         """The log-odds or labels of all frames, some at a time, as they are packed."""
         with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:

@@ -75,8 +75,8 @@ def box_evidence(
         (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
     ]
     if not chosen:
-        none = np.zeros((0, bodies.edges.shape[1]))
-        return BoxEvidence(none[..., None][..., :0], np.zeros(0, np.int64), no_rows(), none)
+        match, inside = np.zeros((0, bodies.edges.shape[1], 0)), np.zeros((0, bodies.edges.shape[1]))
+        return BoxEvidence(match, np.zeros(0, np.int64), no_rows(), inside)
     sizes = np.array([view.camera.size for view, _ in chosen], float)
     boxes = np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64)
     candidates, first = bodies.edges.shape[1], 0 if base is None else base.inside.shape[1]
