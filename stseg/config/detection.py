@@ -37,7 +37,7 @@ class DetectionConfig(Settings):
     pixel_clutter_rate: float = share(0.07)
     """Probability of foreground on a ray past all bodies, 0..1 (b); the volume's first guess."""
     key_frame_interval: float = not_negative(0.5, "0 or more seconds")
-    """Longest time between two frames whose whole ground is searched, seconds; 0 to search it in every frame."""
+    """Longest time between frames whose whole ground is searched, seconds; by boxes 0.2 at most, 0 for every frame."""
     swap_moves: int = not_negative(2, most=COUNT)
     """Rounds of swap moves (one person for two, and the like) in larger groups, where all views deliver pixels."""
 
