@@ -153,6 +153,9 @@ def _table(scores: Scores) -> Table:
         f"false tracks {scores.false_tracks}",
         "" if scores.false_track_frames is None else f"mean {scores.false_track_frames:.1f} frames",
     )
+    if scores.predictions:
+        right = _percent(scores.predicted_precision)
+        table.add_row(f"in gaps {scores.predictions}", f"precision {right}")
     return table
 
 

@@ -24,6 +24,8 @@ class Matches:
     """int64 (k,) each."""
     distance: Floats
     """float64 (k,): metres."""
+    predicted: Flags
+    """bool (k,): whether the track's place is a prediction."""
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -87,10 +89,10 @@ def _gather(sequence: Sequence, matches: list[tuple[Ints, Ints]]) -> Matches:
     track = [frame.track[columns] for frame, (_, columns) in found]
     away = [frame.person_ground[rows] - frame.track_ground[columns] for frame, (rows, columns) in found]
     distance = [np.hypot(one[:, 0], one[:, 1]) for one in away]
-    none = np.zeros(0, np.int64)
-    return Matches(
-        frame, np.concatenate([none, *person]), np.concatenate([none, *track]), np.concatenate([np.zeros(0), *distance])
-    )
+    predicted = [frame.predicted[columns] for frame, (_, columns) in found]
+    starts = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool)
+    columns = zip(starts, (person, track, distance, predicted), strict=True)
+    return Matches(frame, *(np.concatenate([start, *parts]) for start, parts in columns))
 
 
 def idf1(sequence: Sequence, gate: float) -> float:

@@ -40,6 +40,8 @@ class Scores:
         Matches of each frame independently, detections and truths without one.
     moda, modp, precision, recall
         Percent, from those matches; MODP is the mean of 1 - distance / gate.
+    predictions, predicted_precision
+        Number of the tracks' rows that are predicted in filled gaps, and the percentage of them that meet a person.
     location_mean, location_median
         Distance of those matches, metres.
     mota
@@ -71,6 +73,8 @@ class Scores:
     modp: float | None
     precision: float | None
     recall: float | None
+    predictions: int
+    predicted_precision: float | None
     location_mean: float | None
     location_median: float | None
     mota: float | None
@@ -118,6 +122,8 @@ class Scores:
         }
         if self.scale != 1:
             figures["scale"] = round(self.scale, 4)
+        if self.predictions:
+            figures |= {"n_predicted": self.predictions, "predicted_precision": _rounded(self.predicted_precision, 2)}
         return figures
 
 
@@ -192,6 +198,8 @@ def _score(
         modp=_percent(float((1 - per_frame.distance / gate).sum()), hits),
         precision=_percent(hits, detections),
         recall=_percent(hits, truths),
+        predictions=sequence.predictions,
+        predicted_precision=_percent(int(per_frame.predicted.sum()), sequence.predictions),
         location_mean=_mean(per_frame.distance),
         location_median=float(np.median(per_frame.distance)) if hits else None,
         mota=_percent(2 * len(kept) - detections - swaps, truths),

@@ -95,6 +95,8 @@ class Frame:
     """float64 (n, 2), (m, 2): metres."""
     reach: float
     """Metres: distances beyond are infinite in a crowd."""
+    predicted: Flags
+    """bool (m,): tracks whose place is a prediction, in a filled gap."""
 
     @property
     def distance(self) -> Floats:
@@ -114,6 +116,8 @@ class Sequence:
     """int64 (people,): number of evaluated frames of each person, above 0."""
     track_frames: Ints
     """int64 (tracks,): the same for tracks."""
+    predictions: int
+    """Number of rows of the tracks that are predicted."""
 
     @property
     def people(self) -> int:
@@ -153,7 +157,8 @@ def align_frames(
     Parameters
     ----------
     truth, trajectory
-        Tables with the columns frame, id, x, y; the truth may have a column flag.
+        Tables with the columns frame, id, x, y; the truth may have a column flag. Where tracks have a column raw_x,
+        nan marks predictions.
     gate
         Metres within which a track matches a person.
     area, frames, ignore_flagged
@@ -180,12 +185,22 @@ def align_frames(
     _, person, person_frames = np.unique(truth["id"][relevant], return_inverse=True, return_counts=True)
     _, track, track_frames = np.unique(trajectory["id"][evaluated], return_inverse=True, return_counts=True)
     runs = _runs(person_index[relevant], present), _runs(track_index[evaluated], present)
-    person_ground, track_ground = person_ground[relevant], track_ground[evaluated]
+    has_predictions = "raw_x" in (trajectory.dtype.names or ())
+    predicted = np.isnan(trajectory["raw_x"]) if has_predictions else np.zeros(len(trajectory), bool)
+    person_ground, track_ground, predicted = person_ground[relevant], track_ground[evaluated], predicted[evaluated]
     evaluated_frames = tuple(
-        Frame(index, person[people], track[tracks], person_ground[people], track_ground[tracks], 2 * gate)
+        Frame(
+            index,
+            person[people],
+            track[tracks],
+            person_ground[people],
+            track_ground[tracks],
+            2 * gate,
+            predicted[tracks],
+        )
         for index, people, tracks in zip(present.tolist(), *runs, strict=True)
     )
-    return Sequence(len(listed), evaluated_frames, person_frames, track_frames)
+    return Sequence(len(listed), evaluated_frames, person_frames, track_frames, int(predicted.sum()))
 
 
 def require_tables(**tables: object) -> None:

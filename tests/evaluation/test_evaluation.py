@@ -116,6 +116,20 @@ def test_pairs_are_kept_and_more_are_better_than_nearer_ones() -> None:
     assert evaluate(truth, table([(0, 1, 0.4, 0.0), (0, 2, 0.85, 0.0)])).hits == 2
 
 
+def test_predicted_places_have_a_score_of_their_own() -> None:
+    tracks = np.zeros(len(TWO), [*((name, TWO.dtype[name]) for name in TWO.dtype.names), ("raw_x", "<f8")])
+    for name in TWO.dtype.names:
+        tracks[name] = TWO[name]
+    gap = (tracks["id"] == 1) & (tracks["frame"] < 4)
+    tracks["raw_x"][gap] = np.nan
+    tracks["x"][gap & (tracks["frame"] == 0)] += 3.0
+    scores = evaluate(TWO, tracks)
+    assert (scores.predictions, scores.predicted_precision) == (4, 75.0)
+    assert scores.as_dict()["predicted_precision"] == 75.0 and "n_predicted" not in evaluate(TWO, TWO).as_dict()
+    beside = evaluate(TWO, tracks, area=(-1, -1, 2.5, 3))  # the place that is 3 m away is outside, and no person's
+    assert (beside.predictions, beside.predicted_precision) == (3, 100.0)
+
+
 def test_people_outside_do_not_count_but_false_tracks_do() -> None:
     stranger = walk(3, 9.0, TEN)
     outside = table(stranger + walk(4, 11.0, TEN))  # one follows the stranger, one follows no person
