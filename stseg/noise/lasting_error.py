@@ -85,10 +85,14 @@ def constant_errors(
     """
     lags = _lags(frame, tracklets, rate)
     roots, count = np.zeros((len(values), len(lags))), np.zeros(len(lags))
-    for rows in tracklets:
-        for k, (earlier, later) in enumerate(_pairs(frame[rows], lags)):
-            roots[:, k] += np.sqrt(np.abs(values[:, rows[later]] - values[:, rows[earlier]])).sum(1)
-            count[k] += len(later)
+    rows, length = np.concatenate([frame[:0], *tracklets]), [len(one) for one in tracklets]
+    apart = frame.max(initial=0) + lags[-1] + 1  # so one tracklet has no lag to another
+    time = frame[rows] + apart * np.repeat(np.arange(len(tracklets)), length)
+    for k, lag in enumerate(lags.tolist()):
+        after = np.searchsorted(time, time + lag)
+        earlier = np.flatnonzero(np.append(time, -1)[after] == time + lag)
+        roots[:, k] = np.sqrt(np.abs(values[:, rows[after[earlier]]] - values[:, rows[earlier]])).sum(1)
+        count[k] = len(earlier)
     number = np.maximum(count, 1.0)
     variogram = 0.5 * (roots / number) ** 4 / (0.457 + 0.494 / number)
     return _fitted(variogram, count, lags, prior, rate)
@@ -99,13 +103,6 @@ def _lags(frame: Ints, tracklets: Sequence[Ints], rate: float) -> Ints:
     longest = max((int(frame[rows[-1]] - frame[rows[0]]) for rows in tracklets), default=1)
     most = max(min(longest // 2, round(_LONGEST * rate)), 1)
     return np.unique(np.rint(np.geomspace(1, most, 24)).astype(np.int64))
-
-
-def _pairs(frames: Ints, lags: Ints) -> list[tuple[Ints, Ints]]:
-    """Indices of the earlier and the later row of each pair that is a lag apart, for each lag."""
-    after = np.searchsorted(frames, frames + lags[:, None]).clip(max=len(frames) - 1)
-    paired = frames[after] - frames == lags[:, None]
-    return [(np.flatnonzero(which), later[which]) for later, which in zip(after, paired, strict=True)]
 
 
 def _fitted(variogram: Floats, count: Floats, lags: Ints, prior: LastingError, rate: float) -> LastingError:
