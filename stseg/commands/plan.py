@@ -73,10 +73,9 @@ def plan(
 
 def _text(estimate: Forecast, recording: Recording) -> str:
     hours = estimate.frames / recording.rig.frame_rate / 3600
-    shares = ("counting", estimate.counting), ("backgrounds", estimate.learning), ("tracking", estimate.tracking)
-    parts = ", ".join(
-        f"{name} {_span(seconds)}" for name, seconds in (*shares, ("writing the run file", estimate.joining))
-    )
+    names = {"starting": "start", "counting": "counting", "learning": "backgrounds", "tracking": "tracking"}
+    names["joining"] = "writing the run file"
+    parts = ", ".join(f"{words} {_span(getattr(estimate, name))}" for name, words in names.items())
     size, segments = estimate.file_bytes / 2**20, counted(estimate.segments, "segment")
     return "\n".join(
         [

@@ -44,9 +44,9 @@ class Forecast:
     ----------
     frames, segments, workers
         Of the run, of which each segment is made by one worker.
-    counting, learning, tracking, joining
-        Seconds of work of one worker: counting all streams, learning backgrounds, making all segments, writing the run
-        file.
+    starting, counting, learning, tracking, joining
+        Seconds of work of one worker: loading kernels, counting all streams, learning backgrounds, making all segments,
+        writing the run file.
     file_bytes
         Size of the run file; the folder of segments beside it takes as much until it stands.
     """
@@ -54,6 +54,7 @@ class Forecast:
     frames: int
     segments: int
     workers: int
+    starting: float
     counting: float
     learning: float
     tracking: float
@@ -64,7 +65,8 @@ class Forecast:
     def seconds(self) -> float:
         """From the beginning to the end, by workers that do not slow each other down."""
         rounds = -(-self.segments // min(self.workers, self.segments))
-        return self.counting + (self.learning + self.tracking) * rounds / self.segments + self.joining
+        shared = (self.learning + self.tracking) * rounds / self.segments
+        return self.starting + self.counting + shared + self.joining
 
 
 def plan(
@@ -115,15 +117,17 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
     Processor time is measured: a worker with several cores needs a share of that of all threads, but no less than that
     of the thread which takes one frame after the other.
     """
-    cores, cuts, parts = -(-free_cores() // workers), job.segments(), list(_parts(job))
+    cuts, parts = job.segments(), list(_parts(job))
+    cores = -(-free_cores() // min(workers, len(cuts)))  # a run of one segment has one worker
     work = SegmentWorker(job, lambda: cores)
     work.ends = sorted({min(parts[0].first + 1, job.stop), *(part.stop for part in parts)})
     tracking, learning, made = list[float](), list[float](), list[FinishedSegment]()
     with TemporaryDirectory() as name:
         folder = Path(name)
-        ready = replace(parts[0], stop=work.ends[0])  # its kernels are loaded, and its file is joined, before it counts
+        ready, begin = replace(parts[0], stop=work.ends[0]), perf_counter()  # loads kernels, before others count
         path = work.make(ready, folder / "ready.h5", lambda _: None)
         assemble(job, [FinishedSegment(ready, path)], folder / "run.h5")
+        starting = perf_counter() - begin
         for part in parts:
             begin = process_time()
             work.foregrounds(part)
@@ -144,6 +148,7 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
         frames,
         len(cuts),
         workers,
+        starting,
         counting,
         max(learning) * learned,
         sum(tracking) / len(parts) * processed,

@@ -281,7 +281,7 @@ def test_what_the_other_process_compiles_is_noted() -> None:
 def test_the_file_becomes_as_large_as_planned_in_words(rig_path: Path, tmp_path: Path, stdout: Command) -> None:
     plan = json.loads(stdout("plan", rig_path, *OPTIONS, "--workers", "1", "--json"))
     assert (plan["frames"], plan["segments"], plan["workers"]) == (FRAMES, 4, 1)
-    assert plan["seconds"] == pytest.approx(sum(plan[k] for k in ("counting", "learning", "tracking", "joining")))
+    assert plan["seconds"] == pytest.approx(sum(plan[k] for k in ("starting", "counting", "learning", "tracking", "joining")))
     assert min(plan["tracking"], plan["joining"]) > 0 and track(rig_path, tmp_path / "run.h5") == 0
     assert plan["file_bytes"] == pytest.approx((tmp_path / "run.h5").stat().st_size, rel=0.25)
     printed = stdout("plan", rig_path, *OPTIONS, "--frames", "0:20", "--workers", "3")
@@ -290,7 +290,7 @@ def test_the_file_becomes_as_large_as_planned_in_words(rig_path: Path, tmp_path:
 
 @compiled_only
 def test_plans_share_segments_and_refuse_parts_that_are_none(rig_path: Path, refusal: Command) -> None:
-    seconds = [Forecast(1000, 5, workers, 1.0, 2.0, 8.0, 3.0, 1).seconds for workers in (1, 2, 3, 5, 9)]
+    seconds = [Forecast(1000, 5, workers, 0.5, 0.5, 2.0, 8.0, 3.0, 1).seconds for workers in (1, 2, 3, 5, 9)]
     assert seconds == pytest.approx([14.0, 10.0, 8.0, 6.0, 6.0])
     said = f"--frames: found '10:400', expected a part of the recording's frames, 0:{FRAMES}"
     assert said in refusal("plan", rig_path, "--frames", "10:400")
