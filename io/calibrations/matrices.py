@@ -64,10 +64,6 @@ def _read_text(file: Path) -> Mapping[str, Floats]:
     return {"": np.array(numbers).reshape(3, 4)}
 
 
-def _read_npy(file: Path) -> Mapping[str, AnyArray]:
-    return {"": read_npy(file)}
-
-
 def _read_mat(file: Path) -> Mapping[str, AnyArray]:
     data = read_bytes(file, limits.UNPACKED)
     if data[:8] != b"\x89HDF\r\n\x1a\n" and data[512:520] != b"\x89HDF\r\n\x1a\n":
@@ -81,7 +77,7 @@ def _read_mat(file: Path) -> Mapping[str, AnyArray]:
 _READERS: dict[str, Callable[[Path], Mapping[str, AnyArray]]] = {
     ".txt": _read_text,
     ".csv": _read_text,
-    ".npy": _read_npy,
+    ".npy": lambda file: {"": read_npy(file)},
     ".npz": read_npz,
     ".mat": _read_mat,
 }

@@ -48,7 +48,9 @@ def read_pose_toml(files: Sequence[Path]) -> list[ForeignCamera]:
 
 def _poses(top: ForeignTable) -> Iterator[ForeignCamera]:
     cameras = top.table("cameras") if isinstance(top.values.get("cameras"), dict) else top
-    tables = [cameras.table(name) for name, value in cameras.values.items() if _is_camera(value)]
+    needed = {"matrix", "rotation", "translation"}
+    named = cameras.values.items()
+    tables = [cameras.table(name) for name, value in named if isinstance(value, dict) and needed <= set(value)]
     if not tables:
         raise top.error("", "no camera", "tables with matrix, rotation and translation")
     for table in tables:
@@ -59,10 +61,6 @@ def _poses(top: ForeignTable) -> Iterator[ForeignCamera]:
         distortion = table.numbers("distortions", ANY) if "distortions" in table else np.zeros(5)
         translation, matrix = table.vector("translation"), table.matrix("matrix", 3, 3)
         yield camera_from_pose(top.file, name, size, matrix, rotation, translation, distortion, fisheye)
-
-
-def _is_camera(value: object) -> bool:
-    return isinstance(value, dict) and {"matrix", "rotation", "translation"} <= set(value)
 
 
 def read_nvidia_json(files: Sequence[Path]) -> list[ForeignCamera]:

@@ -28,13 +28,14 @@ class PackedNumbers:
     @classmethod
     def of(cls, values: Floats) -> PackedNumbers:
         """Numbers float64 (n, ...) by the largest unit, in the smallest type, that fits."""
+        parts = [slice(start, start + _ROWS_AT_ONCE) for start in range(0, len(values), _ROWS_AT_ONCE)]
         for decimals in range(_MOST_DECIMALS + 1):
             units, most = 10.0**decimals, np.abs(values).max(initial=0.0)
             kind = next((one for one in _WHOLE if most * units < np.iinfo(one).max), None)
             if kind is None:
                 break
             whole = np.empty(values.shape, kind)
-            if all(_fill(whole[k : k + _ROWS_AT_ONCE], values[k : k + _ROWS_AT_ONCE], units) for k in _starts(values)):
+            if all(_fill(whole[part], values[part], units) for part in parts):
                 return cls(whole, units)
         return cls(values, 1.0)
 
@@ -58,10 +59,6 @@ def packed(values: Numbers) -> PackedNumbers:
 def rows_of(values: Numbers, chosen: Flags | Ints) -> Numbers:
     """Some rows, by index or mask, packed where the values are."""
     return PackedNumbers(values.whole[chosen], values.units) if isinstance(values, PackedNumbers) else values[chosen]
-
-
-def _starts(values: Floats) -> range:
-    return range(0, len(values), _ROWS_AT_ONCE)
 
 
 def _fill(whole: AnyArray, values: Floats, units: float) -> bool:

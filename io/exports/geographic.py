@@ -60,7 +60,8 @@ def write_geojson_lines(path: Path, run: Run) -> None:
 
 
 def _moving_point(run: Run, track: np.void, rows: Rows) -> dict[str, object]:
-    times = [_time_of(frame / run.frame_rate) for frame in rows["frame"].tolist()]
+    instants = (BEGINNING + timedelta(seconds=frame / run.frame_rate) for frame in rows["frame"].tolist())
+    times = [instant.isoformat(timespec="milliseconds").replace("+00:00", "Z") for instant in instants]
     score = {"type": "Measure", "values": [_finite(value) for value in rows["score"].tolist()]}
     point = {"type": "MovingPoint", "datetimes": times, "coordinates": _places(rows), "interpolation": "Linear"}
     return {
@@ -82,10 +83,6 @@ def _properties(run: Run, track: np.void) -> dict[str, object]:
 def _places(rows: Rows) -> list[list[float]]:
     """x and y of every row, metres, to 0.1 mm."""
     return [[round(x, 4), round(y, 4)] for x, y in zip(rows["x"].tolist(), rows["y"].tolist(), strict=True)]
-
-
-def _time_of(seconds: float) -> str:
-    return (BEGINNING + timedelta(seconds=seconds)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def _finite(value: float) -> float | None:
