@@ -2,6 +2,7 @@
 
 ablation    what each special case of detection and tracking earns, off one at a time
 compilers   do the ways in which kernels are compiled agree?
+errors      whether sizes and appearance err as much as identities take them to
 few_views   two and three views of everything: scores, and how many of the points the run takes for wrong
 perturbed   mean and spread of scores over runs with perturbed area, grid, cameras and boxes
 rig_scale   how well automatic rigs know their scale
@@ -13,7 +14,7 @@ spoil       what spoiled masks and boxes cost, by kinds, strengths, views and cr
 import importlib
 import sys
 
-EXPERIMENTS = ("ablation", "compilers", "few_views", "perturbed", "rig_scale", "same", "scaling", "spoil")
+EXPERIMENTS = ("ablation", "compilers", "errors", "few_views", "perturbed", "rig_scale", "same", "scaling", "spoil")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 
