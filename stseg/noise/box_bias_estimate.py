@@ -55,17 +55,7 @@ class _Offsets(NamedTuple):
 
 
 class BoxBiasEstimate:
-    """Accumulated normal equations.
-
-    Parameters
-    ----------
-    views
-        Number of views.
-    frame_rate
-        Frames per second.
-    config
-        How fast is forgotten, and from which evidence on people count.
-    """
+    """Accumulated normal equations; parameters as of `stseg.noise.estimates`."""
 
     def __init__(self, views: int, frame_rate: float, config: ErrorRateConfig) -> None:
         self._config, size = config, 1 + SHIFT_TERMS * views

@@ -45,15 +45,7 @@ _POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 
 
 class BoxNoiseEstimate:
-    """Accumulated squared offsets of boxes.
-
-    Parameters
-    ----------
-    frame_rate
-        Frames per second.
-    scale
-        That of `BoxNoise`.
-    """
+    """Accumulated squared offsets of boxes; `scale` is that of `BoxNoise`, others as of `stseg.noise.estimates`."""
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig, scale: float = 1.0) -> None:
         self._config, self._scale = config, scale

@@ -11,7 +11,11 @@ from stseg.view_health.view_failures import ViewFailures
 
 @dataclass
 class Estimates:
-    """Estimates of one session; each frame that is explained updates them."""
+    """Estimates of one session; each frame that is explained updates them.
+
+    Each is made of what it needs of these: the number of views; frames per second; `BodyConfig`, the first guess of the
+    population; `ErrorRateConfig`, how fast is forgotten, and from which evidence on people count.
+    """
 
     box_noise: BoxNoiseEstimate
     box_bias: BoxBiasEstimate

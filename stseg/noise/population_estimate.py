@@ -26,17 +26,7 @@ _LARGEST_SPREAD = 0.45
 
 
 class PopulationEstimate:
-    """Accumulated sizes of people.
-
-    Parameters
-    ----------
-    body
-        The first guess.
-    frame_rate
-        Frames per second.
-    config
-        How fast is forgotten, and from which evidence on people count.
-    """
+    """Accumulated sizes of people; parameters as of `stseg.noise.estimates`."""
 
     def __init__(self, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
         self._first, self._config = body, config

@@ -56,19 +56,7 @@ _SHIFTS = np.stack(np.meshgrid(_ALONG, _ALONG, indexing="ij"), -1).reshape(-1, 2
 
 
 class KnockedViews:
-    """Recognition of knocked views in a session.
-
-    Parameters
-    ----------
-    views
-        Number of views.
-    body
-        Sizes of the population.
-    frame_rate
-        Frames per second.
-    config
-        Memory of the share that a view usually shows.
-    """
+    """Recognition of knocked views in a session; parameters as of `stseg.noise.estimates`."""
 
     def __init__(self, views: int, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
         self._body, self._usual_frames = body, max(_USUAL_TIME * frame_rate, _USUAL_FRAMES)
