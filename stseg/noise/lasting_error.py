@@ -86,8 +86,8 @@ def constant_errors(
     lags = _lags(frame, tracklets, rate)
     roots, count = np.zeros((len(values), len(lags))), np.zeros(len(lags))
     rows, length = np.concatenate([frame[:0], *tracklets]), [len(one) for one in tracklets]
-    apart = frame.max(initial=0) + lags[-1] + 1  # so one tracklet has no lag to another
-    time = frame[rows] + apart * np.repeat(np.arange(len(tracklets)), length)
+    span = frame.max(initial=0) + lags[-1] + 1  # of a tracklet, so none has a lag to another
+    time = frame[rows] + span * np.repeat(np.arange(len(tracklets)), length)
     for k, lag in enumerate(lags.tolist()):
         after = np.searchsorted(time, time + lag)
         earlier = np.flatnonzero(np.append(time, -1)[after] == time + lag)
