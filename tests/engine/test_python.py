@@ -281,7 +281,9 @@ def test_what_the_other_process_compiles_is_noted() -> None:
 def test_the_file_becomes_as_large_as_planned_in_words(rig_path: Path, tmp_path: Path, stdout: Command) -> None:
     plan = json.loads(stdout("plan", rig_path, *OPTIONS, "--workers", "1", "--json"))
     assert (plan["frames"], plan["segments"], plan["workers"]) == (FRAMES, 4, 1)
-    assert plan["seconds"] == pytest.approx(sum(plan[k] for k in ("starting", "counting", "learning", "tracking", "joining")))
+    assert plan["seconds"] == pytest.approx(
+        sum(plan[k] for k in ("starting", "counting", "learning", "tracking", "joining"))
+    )
     assert min(plan["tracking"], plan["joining"]) > 0 and track(rig_path, tmp_path / "run.h5") == 0
     assert plan["file_bytes"] == pytest.approx((tmp_path / "run.h5").stat().st_size, rel=0.25)
     printed = stdout("plan", rig_path, *OPTIONS, "--frames", "0:20", "--workers", "3")

@@ -16,6 +16,7 @@ import reference_evaluation as reference
 from checks import Captured, cases, data_path, drawn, refused
 from cyclopts import App
 from hypothesis import strategies as st
+from numpy.lib.recfunctions import append_fields
 from run_files import table_of
 
 from stseg.arrays import Flags, Ints, Rows
@@ -117,11 +118,8 @@ def test_pairs_are_kept_and_more_are_better_than_nearer_ones() -> None:
 
 
 def test_predicted_places_have_a_score_of_their_own() -> None:
-    tracks = np.zeros(len(TWO), [*((name, TWO.dtype[name]) for name in TWO.dtype.names), ("raw_x", "<f8")])
-    for name in TWO.dtype.names:
-        tracks[name] = TWO[name]
-    gap = (tracks["id"] == 1) & (tracks["frame"] < 4)
-    tracks["raw_x"][gap] = np.nan
+    gap = (TWO["id"] == 1) & (TWO["frame"] < 4)
+    tracks = append_fields(TWO, "raw_x", np.where(gap, np.nan, 0.0), usemask=False)
     tracks["x"][gap & (tracks["frame"] == 0)] += 3.0
     scores = evaluate(TWO, tracks)
     assert (scores.predictions, scores.predicted_precision) == (4, 75.0)
