@@ -6,6 +6,7 @@ import shlex
 import shutil
 import sys
 import tomllib
+from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
@@ -21,6 +22,7 @@ from stseg.io.exports.formats import FORMATS as EXPORTS
 from stseg.io.recording.recording import SOURCE_KINDS
 from stseg.io.recording.rigs import parse_rig
 from stseg.io.runfile import layout
+from stseg.io.runfile.reading.run_reader import Run
 from stseg.trackers import TRACKERS
 
 ROOT = Path(__file__).parents[2]
@@ -69,6 +71,12 @@ def test_files_commands_and_keys_named_exist_and_no_commit(page: Path) -> None:
     for key in named:
         assert key in KEYS or any(known.startswith(f"{key}.") for known in KEYS), key
     assert not re.findall(r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*[0-9])[0-9a-f]{7,40}\b", text)
+
+
+def test_what_pages_say_of_a_run_file_in_python_exists() -> None:
+    named = {name for page in PAGES for name in re.findall(r"\brun\.([a-z_]{4,})", page.read_text("utf-8"))}
+    known = {*dir(Run), *(field.name for field in fields(Run))}
+    assert len(named) > 10 and named - {"html"} <= known
 
 
 _EXAMPLES = {"stseg/foreground/median.py", "stseg/trackers/nearest.py", "io/exports/NAME.py", "io/calibrations/NAME.py"}
