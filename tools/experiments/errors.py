@@ -4,7 +4,7 @@
 
 People are those of the truth. Of heights, and of all axes of appearance together, three mean squares of differences in
 stated standard deviations: between the halves of a person's time and among a person's isolated tracklets, where 1 is as
-stated and less is surer than stated; and between two people, which identities are told by.
+stated and less is more exact than stated; and between two people, which identities are told by.
 """
 
 from collections.abc import Sequence
