@@ -63,12 +63,15 @@ def read_tracks_csv(path: Path) -> Rows:
 
 
 def write_tracks_csv(path: Path, trajectory: Rows, overwrite: bool = False) -> None:
-    """Write a TRAJECTORY table as frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm."""
-    header = ",".join(_WRITTEN) + "\n"
+    """Write a TRAJECTORY table as frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm.
+
+    A cell of nan is empty: in SQL one nan would make every mean nan.
+    """
+    header, line = (",".join(words) + "\n" for words in (_WRITTEN, _WRITTEN.values()))
     require_output(Path(path), overwrite, table=header)
     with replacing(Path(path), overwrite) as part, part.open("w", newline="", encoding="utf-8") as file:
         file.write(header)
-        np.savetxt(file, trajectory[list(_WRITTEN)], fmt=",".join(_WRITTEN.values()))
+        file.writelines((line % row).replace("nan", "") for row in trajectory[list(_WRITTEN)].tolist())
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ def write_csv(path: Path, run: Run) -> None:
 
 
 def write_parquet(path: Path, run: Run) -> None:
-    """Write all columns of the trajectory, as they are, and `time` in seconds; each column's metadata has its unit.
+    """Write all columns of the trajectory, nan as null, and `time` in seconds; each column's metadata has its unit.
 
     The file's metadata under `stseg` say, as JSON, the scene, the frames per second and the cameras.
     """
@@ -41,7 +41,7 @@ def write_parquet(path: Path, run: Run) -> None:
         arrow.field(name, arrow.from_numpy_dtype(column.dtype), False, {"units": _UNITS.get(name, "")})
         for name, column in columns.items()
     ]
-    arrays = [arrow.array(np.ascontiguousarray(column)) for column in columns.values()]
+    arrays = [arrow.array(np.ascontiguousarray(column), from_pandas=True) for column in columns.values()]
     if run.names:
         fields.append(arrow.field("name", arrow.string()))
         arrays.append(arrow.array([run.names.get(int(one)) for one in run.trajectory["id"]], arrow.string()))
@@ -78,14 +78,14 @@ def _write_csv(path: Path, rows: Rows) -> None:
 def _text(value: object) -> object:
     if isinstance(value, bool):
         return int(value)
-    return f"{value:.6g}" if isinstance(value, float) else value
+    return f"{value:.6g}".replace("nan", "") if isinstance(value, float) else value
 
 
 def _write_parquet(path: Path, rows: Rows) -> None:
     arrow, parquet = load_extra("pyarrow", "parquet"), load_extra("pyarrow.parquet", "parquet")
     columns = {name: rows[name].tolist() for name in rows.dtype.names or ()}
     types = {name: arrow.string() if rows.dtype[name] == np.dtype("O") else None for name in columns}
-    table = arrow.table({name: arrow.array(column, types[name]) for name, column in columns.items()})
+    table = arrow.table({name: arrow.array(column, types[name], from_pandas=True) for name, column in columns.items()})
     table = table.replace_schema_metadata({"stseg": MARK.decode()})
     with path.open("wb") as file:  # a path that is no UTF-8 is refused by the library
         parquet.write_table(table, file)
