@@ -38,7 +38,9 @@ def write_parquet(path: Path, run: Run) -> None:
     columns = {name: run.trajectory[name] for name in run.trajectory.dtype.names or ()}
     columns["time"] = run.trajectory["frame"] / run.frame_rate
     fields = [
-        arrow.field(name, arrow.from_numpy_dtype(column.dtype), False, {"units": _UNITS.get(name, "")})
+        arrow.field(
+            name, arrow.from_numpy_dtype(column.dtype), column.dtype.kind == "f", {"units": _UNITS.get(name, "")}
+        )
         for name, column in columns.items()
     ]
     arrays = [arrow.array(np.ascontiguousarray(column), from_pandas=True) for column in columns.values()]

@@ -338,9 +338,10 @@ def test_features_are_those_of_geopandas_and_of_ogc(run: Run, path: Path) -> Non
 
 def test_one_place_is_a_point_and_no_number_is_null(tmp_path: Path) -> None:
     run = run_of(tmp_path / "one.h5", table_of(TRAJECTORY, id=7, frame=12, score=np.nan, height=np.nan))
-    for name in ("geojson", "mf-json", "csv"):
+    for name in ("geojson", "mf-json", "csv", "parquet"):
         FORMATS[name].write(tmp_path / name, run)
     assert (tmp_path / "csv").read_text("utf-8").splitlines()[1] == "12,7,0.0000,0.0000,,,0,0,0,0"
+    assert pyarrow.parquet.read_table(tmp_path / "parquet").column("height").null_count == 1
     (feature,) = (json.loads(line) for line in (tmp_path / "geojson").read_text("utf-8").splitlines())
     assert feature["geometry"] == {"type": "Point", "coordinates": [0.0, 0.0]}
     (moving,) = json.loads((tmp_path / "mf-json").read_text("utf-8"))["features"]
