@@ -37,13 +37,11 @@ def write_parquet(path: Path, run: Run) -> None:
     arrow, parquet = load_extra("pyarrow", "parquet"), load_extra("pyarrow.parquet", "parquet")
     columns = {name: run.trajectory[name] for name in run.trajectory.dtype.names or ()}
     columns["time"] = run.trajectory["frame"] / run.frame_rate
-    fields = [
-        arrow.field(
-            name, arrow.from_numpy_dtype(column.dtype), column.dtype.kind == "f", {"units": _UNITS.get(name, "")}
-        )
-        for name, column in columns.items()
-    ]
     arrays = [arrow.array(np.ascontiguousarray(column), from_pandas=True) for column in columns.values()]
+    units = [{"units": _UNITS.get(name, "")} for name in columns]
+    fields = [
+        arrow.field(name, one.type, metadata=unit) for name, one, unit in zip(columns, arrays, units, strict=True)
+    ]
     if run.names:
         fields.append(arrow.field("name", arrow.string()))
         arrays.append(arrow.array([run.names.get(int(one)) for one in run.trajectory["id"]], arrow.string()))
