@@ -13,10 +13,8 @@ from stseg.io.outputs.whole_files import MARK, Inputs, replacing, require_output
 from stseg.io.runfile.reading.run_reader import Run
 from stseg.io.track_csv import write_tracks_csv
 
-_UNITS = dict.fromkeys(("x", "y", "z", "height", "width", "raw_x", "raw_y"), "m") | dict.fromkeys(
-    ("xx", "xy", "yy", "extent"), "m2"
-)
-_UNITS |= {"score": "nat", "time": "s"}
+_UNITS = {"score": "nat", "time": "s"} | dict.fromkeys(("xx", "xy", "yy", "extent"), "m2")
+_UNITS |= dict.fromkeys(("x", "y", "z", "height", "width", "raw_x", "raw_y"), "m")
 
 
 def write_csv(path: Path, run: Run) -> None:
