@@ -43,7 +43,7 @@ def evaluate(
     Every frame of the truth counts, also one without tracks. Percentages: MODA, MODP, precision and recall evaluate
     each frame by itself; MOTA, IDF1 and HOTA evaluate identities as well. HOTA's similarity falls to 0 at the gate, and
     at twice the gate in "2 gates". MT and ML are the people mostly tracked (over 80 % of their frames) and mostly lost
-    (under 20 %).
+    (under 20 %). "In gaps" is the number of positions that a run file predicts, and the share that meets a person.
 
     Parameters
     ----------
