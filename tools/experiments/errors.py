@@ -83,7 +83,7 @@ def main() -> None:
         prepare(SETS[name], bench)
         tasks = [(name, bench, seed) for seed in range(1, asked.runs + 1)]
         with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-            whole = sum(pool.map(run, *zip(*tasks, strict=True)))
+            whole = np.sum(list(pool.map(run, *zip(*tasks, strict=True))), axis=0)
         for size, (squares, freedom) in zip(("height", "appearance"), np.moveaxis(whole, 2, 0), strict=True):
             if freedom.any():
                 means = [f"{s / n:.2f}" if n else "" for s, n in zip(squares, freedom, strict=True)]
