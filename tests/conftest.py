@@ -1,6 +1,7 @@
 """Settings of all tests, and what tests of many rooms begin with."""
 
 import os
+import signal
 import time
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from recordings import track, write_recording
 from run_files import write_small_run
 
 from stseg.commands.main import main
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # commands inherit that it is ignored, as under `nohup`
 
 # Examples take as long as they take on a machine that others use, too: only a whole test may be too slow. Folders of a
 # test may be those of all its examples, each of which writes its files anew.
