@@ -89,7 +89,8 @@ class Detector:
         self.parameters = ScoreParameters.of(config, core, body.width_mean)
         self.border = Border.of(rig)
         self._has_boxes = "boxes" in kinds
-        self._key_interval = key_frame_interval(rig.frame_rate, config, self._has_boxes)
+        self.key_interval = key_frame_interval(rig.frame_rate, config, self._has_boxes)
+        """Frames from one key frame to the next."""
         swap_sweeps, restarts = (0, _RESTARTS) if self._has_boxes else (config.swap_moves, 0)
         self._search = FrameSearch(self.lattice_ground, self._has_boxes, config.search_rounds, swap_sweeps, restarts)
 
@@ -140,7 +141,7 @@ class Detector:
         observations, failures = self.observe(views, learned.box_noise.noise), learned.failures
         failures.begin(predicted, self.views, observations)
         included: ViewObservations = failures.kept(observations)
-        is_key = frame % self._key_interval == 0
+        is_key = frame % self.key_interval == 0
         if learned.rims.is_young and (is_key or predicted is None) and not self._has_boxes:
             self._learn_first_rims(learned, included, _FIRST_FRAME_SEARCHES if predicted is None else 1)
         evidence = self._learned_evidence(learned, included, predicted)
@@ -178,7 +179,7 @@ class Detector:
     ) -> tuple[Explanation, bool]:
         """A frame's explanation by what has been learned, and whether the whole ground was searched for it."""
         tracks = self._search.of_tracks(evidence)
-        is_new = learned.frames < self._key_interval
+        is_new = learned.frames < self.key_interval
         if not (is_key or is_new) and predicted is not None and proposals is None:
             explanation = followed_frame(tracks, self._search)
             if explanation is not None:

@@ -4,9 +4,9 @@ All that is learned from the frames belongs to the session: the foreground model
 body sizes, the error rates of the views, and the tracker's tracks. Sessions of one pipeline know nothing of each other.
 
 Detection needs the tracks of the frame before, so it goes frame by frame. The foreground of the next frames needs
-nothing of it; it waits neither for a frame's volume nor for the cut of a window: `run_session` gives each a thread of
-its own from the frame on at which it has more than one core: threads cost a seventh more processor time. Every stage
-still takes the frames in their order, so the results are the same, bit for bit.
+nothing of it; it waits neither for a frame's volume nor for the cut of a window: `run_session` gives them a thread for
+each further core, from the frame on at which it has one. Every stage still takes the frames in their order, so the
+results are the same, bit for bit.
 """
 
 from collections import deque
@@ -234,12 +234,14 @@ def _prepared(
     session: Session, coming: Iterator[FrameSet], cores: Callable[[], int], threads: ExitStack
 ) -> Iterator[_Prepared]:
     """Frame sets with their evidence; with several cores some are made while the caller works on the last."""
-    while cores() < 2:
+    while (free := cores()) < 2:
         if (prepared := _next_prepared(session, coming)) is None:
             return
         yield prepared
-    ahead, *shared = (threads.enter_context(ThreadPoolExecutor(1, name)) for name in ("foreground", "fusion", "cuts"))
-    session.share(*shared)
+    number = min(free - 1, 3)  # more threads than cores wait for the interpreter
+    helpers = [threads.enter_context(ThreadPoolExecutor(1, "helper")) for _ in range(number)]
+    ahead, fusion, cuts = (helpers[k % number] for k in range(3))
+    session.share(fusion, cuts)
     waiting = deque(ahead.submit(_next_prepared, session, coming) for _ in range(_AHEAD))
     try:
         while (prepared := waiting.popleft().result()) is not None:

@@ -1,11 +1,10 @@
 """`stseg.plan`: duration and size of a run, from short parts of its recording that are tracked."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time, thread_time
+from time import perf_counter, process_time
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,14 +25,20 @@ from stseg.io.machine import free_cores
 from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.layout import VolumeKind
+from stseg.io.runfile.runs import read_run
 from stseg.tracking.windows.windows import window_length
 
 _PLACES = 3
-"""Number of tried parts, spread over the recording: where few people are, and where many are."""
+"""Number of tracked parts, spread over the recording: where few people are, and where many are."""
 _FRAMES = 12
 """Frames of each, so that all take no longer than a second or two."""
 _READY = 4
 """First frames of a part that do not count: frames without tracks cost more than others."""
+_LEAST_FRAMES, _SECONDS = _READY + 2, 0.5
+"""Frames of each part but the first at least, and about how long it takes where it has more."""
+
+_PROCESS = 1.0
+"""Time in which a process imports what it needs, seconds; workers begin once that of the command has."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +50,8 @@ class Forecast:
     frames, segments, workers
         Of the run, of which each segment is made by one worker.
     starting, counting, learning, tracking, joining
-        Seconds of work of one worker: loading kernels, counting all streams, learning backgrounds, making all segments,
-        writing the run file.
+        Seconds of work of one worker: imports and loading kernels, counting all streams, learning backgrounds, making
+        all segments, writing the run file.
     file_bytes
         Size of the run file; the folder of segments beside it takes as much until it stands.
     """
@@ -111,74 +116,92 @@ def plan(
     return forecast(job, counting, workforce.processes(job))
 
 
-def forecast(job: Job, counting: float, workers: int) -> Forecast:
-    """Forecast of a job, from parts of it that are tracked now; `counting` is in seconds.
+class _Sample(NamedTuple):
+    """A short part of the run that was tracked, with its file."""
 
-    Processor time is measured: a worker with several cores needs a share of that of all threads, but no less than that
-    of the thread which takes one frame after the other.
-    """
-    cuts, parts = job.segments(), list(_parts(job))
+    made: FinishedSegment
+    learning: float
+    frame: float
+    window: float
+    """Seconds of learning backgrounds, of a frame, and of a window that is cut after all frames."""
+
+    @property
+    def frames(self) -> int:
+        """Number of its frames."""
+        return self.made.segment.stop - self.made.segment.first
+
+
+def forecast(job: Job, counting: float, workers: int) -> Forecast:
+    """Forecast of a job, from parts of it that are tracked now; `counting` is in seconds."""
+    cuts, rate = job.segments(), job.recording.rig.frame_rate
     cores = -(-free_cores() // min(workers, len(cuts)))  # a run of one segment has one worker
-    work = SegmentWorker(job, lambda: cores)
-    work.ends = sorted({min(parts[0].first + 1, job.stop), *(part.stop for part in parts)})
-    tracking, learning, made = list[float](), list[float](), list[FinishedSegment]()
+    work, parts, samples = SegmentWorker(job, lambda: cores), list(_parts(job)), list[_Sample]()
     with TemporaryDirectory() as name:
-        folder = Path(name)
-        ready, begin = replace(parts[0], stop=work.ends[0]), perf_counter()  # loads kernels, before others count
-        path = work.make(ready, folder / "ready.h5", lambda _: None)
-        assemble(job, [FinishedSegment(ready, path)], folder / "run.h5")
-        starting = perf_counter() - begin
+        folder, begin = Path(name), perf_counter()
+        one = _sample_of(work, replace(parts[0], stop=parts[0].first + 1), folder, cores)
+        _time_to_join(job, one, folder)  # this and all before it loads kernels
+        starting, most = perf_counter() - begin, _FRAMES
         for part in parts:
-            begin = process_time()
-            work.foregrounds(part)
-            learning.append(process_time() - begin)
-            clock = [(process_time(), thread_time())]
-            path = work.make(part, folder / f"{part.index}.h5", partial(_note_time, clock))
-            made.append(FinishedSegment(part, path))
-            clock.append((process_time(), thread_time()))
-            tracking.append(_time_of_frame(np.array(clock), cores))
-        joining = [_time_to_join(job, made[:number], folder / "run.h5") for number in (1, len(made))]
-        size = (folder / "run.h5").stat().st_size
-    rate, tried = job.recording.rig.frame_rate, sum(part.stop - part.first for part in parts)
-    frames = sum(segment.stop - segment.first for segment in cuts)
-    excess = window_length(rate, job.config.tracking)[0]  # a segment is processed until its last window is solved
-    processed = sum(segment.stop - segment.lead + excess for segment in cuts)
+            samples.append(_sample_of(work, replace(part, stop=min(part.stop, part.first + most)), folder, cores))
+            most = max(_LEAST_FRAMES, int(_SECONDS / max(samples[-1].frame, 0.01)))
+        joining = [_time_to_join(job, part, folder) for part in (one, samples[0])]
+        bytes_of_one = one.made.path.stat().st_size
+        size = sum(part.made.path.stat().st_size - bytes_of_one for part in samples)
+    frames, more = sum(segment.stop - segment.first for segment in cuts), sum(part.frames - 1 for part in samples)
+    length, shared = window_length(rate, job.config.tracking)
+    processed = sum(segment.stop - segment.lead + length for segment in cuts)  # until the last window is solved
+    of_frame = float(np.mean([part.frame + part.window / (length - shared) for part in samples]))
     learned = -(-frames // round(job.config.segments.background_period * rate))
+    joining_more = max(joining[1] - joining[0], 0.0) / max(samples[0].frames - 1, 1)
     return Forecast(
         frames,
         len(cuts),
         workers,
-        starting,
+        starting + _PROCESS * min(workers, len(cuts), 2),
         counting,
-        max(learning) * learned,
-        sum(tracking) / len(parts) * processed,
-        joining[0] + max(joining[1] - joining[0], 0.0) / tried * frames,
-        round(size / tried * frames),
+        max(part.learning for part in samples) * learned,
+        of_frame * processed,
+        joining[0] + joining_more * frames,
+        bytes_of_one + round(size / max(more, 1) * frames),
     )
 
 
-def _time_of_frame(clock: Floats, cores: int) -> float:
-    """Time of a worker with so many cores for a frame, seconds.
+def _sample_of(work: SegmentWorker, part: Segment, folder: Path, cores: int) -> _Sample:
+    """Track a part by a worker that has so many cores.
 
-    `clock` float64 (frame + 2, 2) is processor time, of all threads and of the one that takes a frame after the other:
-    before the frames, after each, and when all windows are cut, which belongs to all frames alike.
+    With one core its processor time counts. With several the whole time does: threads wait for each other.
     """
-    frames = len(clock) - 2
-    skipped = min(_READY, frames - 1)
-    whole, main = (clock[-2] - clock[skipped]) / (frames - skipped)
-    whole += (clock[-1, 0] - clock[-2, 0]) / frames
-    return float(max(whole / cores, main))
+    seconds = process_time if cores == 1 else perf_counter
+    work.ends, begin = [part.stop], process_time()
+    work.foregrounds(part)
+    learning, clock = process_time() - begin, [seconds()]
+    path = work.make(part, folder / f"{part.index}_{part.stop}.h5", lambda _: clock.append(seconds()))
+    clock.append(seconds())
+    of_window = (clock[-1] - clock[-2]) / max(len(read_run(path).windows), 1)
+    of_frame = _time_of_frame(np.array(clock), part.first, work.pipeline.detector.key_interval)
+    return _Sample(FinishedSegment(part, path), learning, of_frame, of_window)
 
 
-def _time_to_join(job: Job, made: Sequence[FinishedSegment], output: Path) -> float:
+def _time_of_frame(clock: Floats, first: int, key_interval: int) -> float:
+    """Mean seconds of a frame, of which one in `key_interval` is a key frame; so are the first ones of a part.
+
+    `clock` float64 (frame + 2,) is in seconds: before the frames, which begin with `first`, after each, and after all
+    windows.
+    """
+    durations = np.diff(clock[:-1])
+    number = np.arange(len(durations))
+    is_key = (number < key_interval) | ((first + number) % key_interval == 0)
+    counts = number >= min(_READY, len(durations) - 1)
+    of_key, of_others = (durations[counts & chosen] for chosen in (is_key, ~is_key))
+    if not len(of_key) or not len(of_others):
+        return float(durations[counts].mean())
+    return float(of_others.mean() + (of_key.mean() - of_others.mean()) / key_interval)
+
+
+def _time_to_join(job: Job, part: _Sample, folder: Path) -> float:
     begin = process_time()
-    assemble(job, made, output)
+    assemble(job, [part.made], folder / "run.h5")
     return process_time() - begin
-
-
-def _note_time(clock: list[tuple[float, float]], _: int) -> None:
-    """Append the processor time of all threads, and of this one, after a further frame."""
-    clock.append((process_time(), thread_time()))
 
 
 def _parts(job: Job) -> list[Segment]:
