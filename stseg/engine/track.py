@@ -149,7 +149,7 @@ def track_recording(
             first, stop = resolve_frames(frames, streams, recording)
             job = Job(recording, config, tracker, volume, first, stop, streams, people)
             finished = _make_segments(job, folder, workforce, reporter)
-            assemble(job, finished, folder.result, workforce.caller(job, reporter.note))
+            assemble(job, finished, folder.result)
             return_freed_memory()
             folder.publish(overwrite)
         folder.remove()

@@ -41,6 +41,9 @@ def test_candidates_add_what_larger_sets_score_more(seed: int) -> None:
     """Each has the evidence, box and track that it has as a member."""
     frame, members, candidates = scaled(random_frame(seed, 8, 3)), np.array([5, 3, 0]), np.arange(8)
     gains, *found = additions(frame, members, candidates)
+    boxes, tracks = alone = np.full((4, 8), -1), np.empty(8, np.int64)
+    fill_gains(members, candidates, frame.problem(), np.empty(0), np.empty((4, 8)), boxes, tracks)
+    assert all(np.array_equal(*pair) for pair in zip(alone, found[1:], strict=True))
     for i in candidates:
         others = members[members != i]
         larger, before = np.append(others, i), frame.score(others)

@@ -1,7 +1,6 @@
 """The Python interface: public names, calls that are commands, and plans."""
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -11,7 +10,6 @@ from typing import Any
 
 import cv2
 import h5py
-import numba
 import numpy as np
 import pytest
 from checks import Command, cases, compiled_only, refused
@@ -23,9 +21,7 @@ import stseg
 from stseg.arrays import Boxes
 from stseg.commands.main import main
 from stseg.engine.observations import as_observation
-from stseg.engine.offline.calls import called_beside, called_here
-from stseg.engine.offline.frame_range import FrameRange
-from stseg.errors import ConfigError, OutputError
+from stseg.errors import OutputError
 from stseg.tasks.forecast import Forecast
 from stseg.tasks.warnings import crowd_warnings
 
@@ -245,36 +241,6 @@ def test_a_public_object_shows_itself_in_ten_lines(name: str, instances: dict[st
     shown = repr(instances[name] if isinstance(public, type) else public)
     assert shown.count("\n") < 10 and len(shown) < 600
     assert not shown.startswith("<stseg")
-
-
-def _dies_elsewhere(process: int) -> int:
-    if os.getpid() != process:
-        os._exit(1)
-    return 7
-
-
-def _compiles() -> int:
-    return int(numba.njit(lambda: 3)())
-
-
-def test_calls_are_made_in_other_processes_or_here_at_once() -> None:
-    with called_beside(print, os.getpid) as result:
-        assert result() != os.getpid()
-    with called_beside(print, FrameRange.parse, "none") as result:
-        refused(ConfigError, "--frames", result)
-    with called_beside(print, _dies_elsewhere, os.getpid()) as result:
-        assert result() == 7
-    made = list[int]()
-    with called_here(made.append, 1) as result:
-        assert (made, result(), made) == ([1], None, [1])
-
-
-@compiled_only
-def test_what_the_other_process_compiles_is_noted() -> None:
-    notes = list[str]()
-    with called_beside(notes.append, _compiles) as result:
-        assert result() == 3
-    assert notes == ["compiling kernels, once on this machine, about a minute of work"]
 
 
 @compiled_only

@@ -5,7 +5,7 @@ Gains are kept, view by view, until a member comes or goes that they depend on.
 
 from stseg.arrays import Floats, Ints
 from stseg.detection.score.box_state import box_gain, box_part
-from stseg.detection.score.pixel_state import assign_in_view, overlaps, pixel_gain, pixel_part, reassign_pixels
+from stseg.detection.score.pixel_state import assign_in_view, overlaps, pixel_gain, reassign_pixels
 from stseg.detection.score.set_state import SetState
 from stseg.detection.score.track_state import assign_track, release_track, track_after, track_gain
 from stseg.kernels.accelerate import kernel
@@ -70,13 +70,13 @@ def gain(i: int, absent: int, state: SetState) -> float:
 def fill_evidence(i: int, state: SetState, parts: Floats, box: Ints) -> int:
     """Fill parts and box (view,) of candidate i as a further member: evidence, nats, and its box, -1 for none.
 
-    Views with boxes come first; box is filled for these alone. Returns the predicted track that it continues, -1 for a
-    birth.
+    Views with boxes come first; box is filled for these alone. Evidence of pixels is that of the gain that was asked
+    for last. Returns the predicted track that it continues, -1 for a birth.
     """
     boxes, parameters = state.boxes, state.problem.parameters
     for view in range(boxes.views):
         parts[view] = box_part(view, i, state.inside, boxes, parameters)
         box[view] = boxes.pairs.own_box[i]
     for view in range(len(state.pixels.evidence.raster)):
-        parts[boxes.views + view] = parameters.effective_observations * pixel_part(view, i, state.pixels)
+        parts[boxes.views + view] = parameters.effective_observations * state.pixels.view_evidence[view, i]
     return track_after(i, state.tracks)

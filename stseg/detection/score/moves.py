@@ -34,10 +34,25 @@ def put(i: int, place: int, state: SetState) -> None:
     """Put candidate i at a place of the set, and back again after it was withdrawn from it; gains are kept."""
     members, size = state.members, state.size
     members[size[0]] = members[place]
-    members[place], state.inside[i] = i, True
+    members[place] = i
     size[0] += 1
     assign_pixels(i, state.pixels)
+    _assign_others(i, state)
+
+
+@part
+def _assign_others(i: int, state: SetState) -> None:
+    """Assign to candidate i, as a member, what is no pixel: boxes and a track."""
+    state.inside[i] = True
     assign_track(i, state.tracks)
+    list_members(i, state.inside, state.boxes)
+
+
+@part
+def _release_others(i: int, state: SetState) -> None:
+    """Take these from candidate i, which is no member then."""
+    state.inside[i] = False
+    release_track(i, state.inside, state.tracks)
     list_members(i, state.inside, state.boxes)
 
 
@@ -46,11 +61,10 @@ def withdraw(place: int, state: SetState) -> int:
     """Take the member at a place out of the set, and keep the gains; returns the candidate."""
     members, size, i = state.members, state.size, int(state.members[place])
     size[0] -= 1
-    members[place], state.inside[i] = members[size[0]], False
+    members[place] = members[size[0]]
     for view in range(len(state.pixels.evidence.raster)):
         reassign_pixels(view, i, state.inside, state.pixels)
-    release_track(i, state.inside, state.tracks)
-    list_members(i, state.inside, state.boxes)
+    _release_others(i, state)
     return i
 
 
@@ -147,22 +161,30 @@ def fill_gains(
     """Fill gains (k,) with those of some candidates, int64 (k,), in the set of the members, int64 (n,): nats.
 
     Filled with what `fill_evidence` says of each, of members beside the others, are `view_evidence` float64 (view, k),
-    boxes int64 (view, k) and tracks int64 (k,).
+    boxes int64 (view, k) and tracks int64 (k,). If gains are (0,), boxes and tracks alone are found.
     """
     whole = set_state(problem)
     state = pointed(whole)
     for i in members:
-        put(i, state.size[0], state)
+        if len(gains):
+            put(i, state.size[0], state)
+        else:
+            _assign_others(i, state)
     for k in range(len(candidates)):
         i, place, is_member = candidates[k], 0, state.inside[candidates[k]]
-        while is_member and state.members[place] != i:
-            place += 1
-        if is_member:
-            withdraw(place, state)
-        gains[k] = gain(i, NO_MEMBER, state)
+        if len(gains):
+            while is_member and state.members[place] != i:
+                place += 1
+            if is_member:
+                withdraw(place, state)
+            gains[k] = gain(i, NO_MEMBER, state)
+        elif is_member:
+            _release_others(i, state)
         tracks[k] = fill_evidence(i, state, view_evidence[:, k], boxes[:, k])
-        if is_member:
+        if is_member and len(gains):
             put(i, place, state)
+        elif is_member:
+            _assign_others(i, state)
     release(state)
     whole.size[0] = 0  # held by name until here (`pointed`)
 

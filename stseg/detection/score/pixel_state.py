@@ -5,7 +5,7 @@ Candidates whose outlines share no pixel in a view have nothing to do with each 
 
 from typing import NamedTuple
 
-from stseg.arrays import Flags
+from stseg.arrays import Flags, Floats
 from stseg.detection.problem import PixelAssignment, PixelEvidence, RaggedArray
 from stseg.kernels.accelerate import kernel, part
 
@@ -17,6 +17,9 @@ class PixelState(NamedTuple):
     """The pixels, and the candidates' outlines."""
     owner: PixelAssignment
     """The set's assignment of pixels, -1 for none."""
+    view_evidence: Floats
+    """float64 (view, candidate): evidence for each candidate as a further member by its last `pixel_gain`, for
+    observations of weight 1."""
 
 
 @part
@@ -79,35 +82,24 @@ def reassign_pixels(view: int, i: int, inside: Flags, state: PixelState) -> None
 
 @kernel
 def pixel_gain(view: int, i: int, state: PixelState) -> float:
-    """Change of a view's pixel score when candidate i joins the set, for observations of weight 1."""
+    """Change of a view's pixel score when candidate i joins the set, for observations of weight 1.
+
+    The view's evidence for i, which leaves out what other members lose, is noted in `view_evidence`.
+    """
     pixels, owner = state.evidence, state.owner[view]
     first, raster, distance = pixels.first[view, i], pixels.raster[view], pixels.distance[view]
-    scale, area, gained = pixels.scale[view], pixels.area[view], 0.0
+    scale, area, gained, evidence = pixels.scale[view], pixels.area[view], 0.0, 0.0
     for k in range(_rows(view, i, state)):
         line = (first + k) * pixels.raster.shape[2]
         for u in range(pixels.spans[view, i, k, 0], pixels.spans[view, i, k, 1]):
             before = owner[line + u]
             if before < 0 or distance[before] > distance[i]:
-                gained += raster[first + k, u] / max(area[i], scale[first + k, u])
+                value = raster[first + k, u] / max(area[i], scale[first + k, u])
+                gained, evidence = gained + value, evidence + value
             if before >= 0 and distance[before] > distance[i]:
                 gained -= raster[first + k, u] / max(area[before], scale[first + k, u])
+    state.view_evidence[view, i] = evidence
     return gained
-
-
-@part
-def pixel_part(view: int, i: int, state: PixelState) -> float:
-    """A view's evidence for candidate i as a further member, for observations of weight 1."""
-    pixels, owner, evidence = state.evidence, state.owner[view], 0.0
-    first, distance = pixels.first[view, i], pixels.distance[view]
-    for k in range(_rows(view, i, state)):
-        line = (first + k) * pixels.raster.shape[2]
-        for u in range(pixels.spans[view, i, k, 0], pixels.spans[view, i, k, 1]):
-            before = owner[line + u]
-            if before < 0 or distance[before] > distance[i]:
-                evidence += pixels.raster[view, first + k, u] / max(
-                    pixels.area[view, i], pixels.scale[view, first + k, u]
-                )
-    return evidence
 
 
 @kernel

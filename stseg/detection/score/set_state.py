@@ -76,7 +76,7 @@ def set_state(problem: DetectionProblem) -> SetState:
     kept = Kept(numbers, np.zeros(parts + 1), np.zeros(candidates + parts, np.bool_))
     return SetState(
         problem,
-        PixelState(problem.pixels, problem.owner),
+        PixelState(problem.pixels, problem.owner, np.zeros(problem.pixels.first.shape)),
         boxes,
         tracks,
         numbers[: candidates + 1],

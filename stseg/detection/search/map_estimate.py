@@ -104,11 +104,29 @@ class MapEstimate:
     @property
     def track_index(self) -> Ints:
         """The predicted track that each member continues, int64 (member,); -1 for births."""
-        return self.members_score.track_index
+        return self._assignment[0]
+
+    @property
+    def member_boxes(self) -> Ints:
+        """The box of each member in each view, int64 (view, member), -1 for none."""
+        return self._assignment[1]
+
+    @cached_property
+    def _assignment(self) -> tuple[Ints, Ints]:
+        known = vars(self).get("members_score")  # has it, too, if it was asked for before
+        return self.assignment_of(self.members) if known is None else (known.track_index, known.box)
+
+    def assignment_of(self, candidates: Ints) -> tuple[Ints, Ints]:
+        """The track and the boxes of some candidates, as of `additions`: int64 (m,) and (view, m)."""
+        found = self._filled(candidates, np.empty(0))
+        return found.track_index, found.box
 
     def additions(self, candidates: Ints) -> Additions:
         """Gains of some candidates, int64 (m,), each by itself; of members, what they are worth."""
-        gains, tracks = np.empty(len(candidates)), np.empty(len(candidates), np.int64)
+        return self._filled(candidates, np.empty(len(candidates)))
+
+    def _filled(self, candidates: Ints, gains: Floats) -> Additions:
+        tracks = np.empty(len(candidates), np.int64)
         evidence = np.zeros((len(self.evidence.views), len(candidates)))
         box = np.full(evidence.shape, -1, np.int64)
         fill_gains(self.members, candidates, self.problem, gains, evidence, box, tracks)
@@ -147,17 +165,14 @@ class MapEstimate:
         number = _add_separate(self.pool.ground, order, distance, chosen, count)
         return chosen[count:number]
 
-    @property
-    def member_boxes(self) -> Ints:
-        """The box of each member in each view, int64 (view, member), -1 for none."""
-        return self.members_score.box
-
     @cached_property
     def box_assignment(self) -> list[Ints]:
         """For each view the member that each box is assigned to, int64 (box,); -1 for none."""
         pairs = zip(self.evidence.views, self.evidence.observations, strict=True)
         numbers = [len(o.edges) if o and isinstance(view, BoxView) else 0 for view, o in pairs]
         assignment = [np.full(number, -1, np.int64) for number in numbers]
+        if not any(numbers):
+            return assignment
         for member_of, box in zip(assignment, self.member_boxes, strict=True):
             assigned = np.flatnonzero(box >= 0)
             member_of[box[assigned]] = assigned

@@ -124,10 +124,10 @@ def _scores(
     """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
     score = np.repeat(evidence.prior.log_height(heights)[..., None], len(PLACES), 2)
     if len(evidence.rasters):
-        tall = np.repeat(heights, len(PLACES), 1)  # places are inner
-        places, widths = np.tile(patch, (1, heights.shape[1], 1)), np.repeat(pool.width[:, None], tall.shape[1], 1)
-        pillars = evidence.views[0].tried(places, tall, widths)
-        score += _pixel_scores(evidence, assignment, pillars).reshape(score.shape)
+        tall = np.tile(heights, (1, len(PLACES)))  # heights are inner: each place is looked up once
+        places, widths = np.repeat(patch, heights.shape[1], 1), np.repeat(pool.width[:, None], tall.shape[1], 1)
+        of_pillar = _pixel_scores(evidence, assignment, evidence.views[0].tried(places, tall, widths))
+        score += of_pillar.reshape(len(pool), len(PLACES), heights.shape[1]).transpose(0, 2, 1)
     if len(pool) and any(isinstance(view, BoxView) for view in evidence.views):
         score += _box_scores(patch, evidence, assignment.box, heights)
     return score

@@ -53,10 +53,12 @@ def moved_members(estimate: MapEstimate, chosen: Ints) -> Candidates:
 
 def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
     """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
-    score = estimate.members_score if chosen is None else estimate.additions(estimate.members[chosen])
-    chosen = np.arange(len(estimate.members)) if chosen is None else chosen
-    assignment = EvidenceAssignment(score.box, estimate.pixel_assignment, chosen)
-    return _refined(estimate, estimate.pool.at(estimate.members[chosen]), assignment, score.track_index)
+    if chosen is None:
+        chosen, track_index, boxes = np.arange(len(estimate.members)), estimate.track_index, estimate.member_boxes
+    else:
+        track_index, boxes = estimate.assignment_of(estimate.members[chosen])
+    assignment = EvidenceAssignment(boxes, estimate.pixel_assignment, chosen)
+    return _refined(estimate, estimate.pool.at(estimate.members[chosen]), assignment, track_index)
 
 
 def followed_members(estimate: MapEstimate, chosen: Ints, start: Candidates) -> RefinedPeople:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.engine.offline.calls import Caller, called_here
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segments import Segment
 from stseg.engine.pipeline import box_tables, finished_tracks
@@ -102,22 +101,18 @@ class _Association(NamedTuple):
     tracks: FinalTracks
 
 
-def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: Caller = called_here) -> None:
+def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> None:
     """Write the run file of a job from its finished segments.
 
-    What takes no track ids is copied while the tracks are associated, by `call`. Rows are read and written part by
-    part, from all segments in their order. An existing output is replaced.
+    Rows are read and written part by part, from all segments in their order. An existing output is replaced.
     """
     return_freed_memory()  # of tracking
     views = read_run(finished[0].path).views
     config, recording = as_toml(job.config), with_alignment(job.recording, job.streams.frame_at_tick)
-    with (
-        call(_associated, job, finished) as association,
-        RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer,
-    ):
+    segments, events, tracks = _associated(job, finished)
+    with RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer:
         for _, path in finished:
             _copy(read_run(path), writer)
-        segments, events, tracks = association()
         _append_segments(job, segments, tracks.identity, writer)
         writer.append("trajectory", tracks.trajectory)
         if not find_tracker(job.tracker).final:

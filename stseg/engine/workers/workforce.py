@@ -2,19 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from multiprocessing import current_process
 from pathlib import Path
 
 from stseg.engine.memory import process_memory
-from stseg.engine.offline.calls import Caller, called_beside, called_here
 from stseg.engine.offline.due_segments import DueSegments
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.reporter import Advance, Note
 from stseg.engine.workers.cluster import make_by_cluster
 from stseg.engine.workers.local_workers import make_by_workers
-from stseg.engine.workers.worker_processes import FORKED, GUARD, prepare_workers, processes_that_fit
+from stseg.engine.workers.worker_processes import GUARD, prepare_workers, processes_that_fit
 from stseg.errors import ConfigError
 from stseg.io.machine import free_cores
 
@@ -48,11 +46,6 @@ class Workforce:
         """Make ready what takes time, while the recording is counted."""
         if self.scheduler is None:
             prepare_workers(self.workers)
-
-    def caller(self, job: Job, note: Note) -> Caller:
-        """Caller of a function for which this process need not wait; `note` is called with lines about the work."""
-        several = self.scheduler is None and self.processes(job) > 1
-        return partial(called_beside, note) if several and FORKED else called_here
 
     def make(self, job: Job, due: DueSegments, draft: Callable[[int], Path], advance: Advance, note: Note) -> None:
         """Make segments until none is due.
