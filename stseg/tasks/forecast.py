@@ -26,6 +26,7 @@ from stseg.io.recording.aligned_stream import index_streams
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.runs import read_run
+from stseg.kernels.accelerate import compilation_noted
 from stseg.tracking.windows.windows import window_length
 
 _PLACES = 3
@@ -109,11 +110,19 @@ def plan(
     begin = perf_counter()
     streams = index_streams(recording)
     counting = perf_counter() - begin
-    for note in streams.notes:
-        reporter_of(progress).note(note)
+    reporter, compilations = reporter_of(progress), list[str]()
+    for line in streams.notes:
+        reporter.note(line)
     first, stop = resolve_frames(chosen, streams, recording)
     job = Job(recording, resolved, tracker, volume, first, stop, streams)
-    return forecast(job, counting, workforce.processes(job))
+
+    def note(line: str) -> None:
+        compilations.append(line)
+        reporter.note(line)
+
+    with compilation_noted(note):
+        found = forecast(job, counting, workforce.processes(job))
+    return forecast(job, counting, workforce.processes(job)) if compilations else found  # the run compiles nothing then
 
 
 class _Sample(NamedTuple):
