@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Flags, Floats, Ints
 from stseg.config import BodyConfig
 
 _UNMEASURED_SHARE = 0.6
@@ -98,6 +98,11 @@ def log_heavy_tailed(deviation: Floats) -> Floats:
 def log_population_height(height: Floats, body: BodyConfig) -> Floats:
     """Log density of heights in the population, metres, beside that of the mean height: nats."""
     return log_heavy_tailed((height - body.height_mean) / body.height_spread)
+
+
+def is_rare_height(height: Floats, body: BodyConfig) -> Flags:
+    """Whether heights, metres, lie in the tails of the population, as those of children do."""
+    return np.asarray(np.abs(height - body.height_mean) > _TAIL * body.height_spread)
 
 
 _LEAST_PRECISION = 1e-6

@@ -1,10 +1,24 @@
 """Named scenes in which views contradict each other: ghosts, and unexplained pixels."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scenes import CONFIG, boxes, corner_cameras, detector_of, evidence_of, expecting, looking, mask, people, rig_of
+from scenes import (
+    BODY,
+    CONFIG,
+    FEW_HEIGHTS,
+    boxes,
+    corner_cameras,
+    detector_of,
+    evidence_of,
+    expecting,
+    looking,
+    mask,
+    people,
+    rig_of,
+)
 
 from stseg import CommittedFrames, FrameSet, Rig
 from stseg.arrays import Floats, Shorts, Singles
@@ -172,6 +186,21 @@ def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
         assert len(chains) == 4
         who.add(int(chains[away.argmin()]))
     assert len(who) == 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("cameras", [2, 3, 4])
+def test_a_child_comes_to_light(kind: str, cameras: int) -> None:
+    """No frame is sure of one who appears between adults, but the evidence of few frames adds up."""
+    rig, body = rig_of(corner_cameras()[:cameras]), replace(BODY, heights=(1.0, 1.25, 1.6, 1.7, 1.8))
+    detector, follow = Detector(rig, [kind] * cameras, FEW_HEIGHTS, body), TrackFilter(8.0, replace(CONFIG, body=body))
+    adults, child = people((-1.0, -0.6), (1.0, 0.9, 1.8)), people((0.1, 0.0, 1.0))
+    for frame, standing in enumerate([adults, adults, *[np.concatenate([adults, child])] * 4]):
+        views = evidence_of(kind, rig.cameras, standing)
+        found = detector.explain(views, follow.predict(frame))
+        follow.update(frame, found.people, found.ghosts, views)
+    assert_these(found, standing)
+    assert found.people.height.min() < 1.3
 
 
 BACKGROUND = np.float32(-2.2)

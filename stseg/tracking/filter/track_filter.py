@@ -17,7 +17,7 @@ from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.config import Config
 from stseg.records.people import People
 from stseg.records.predicted_tracks import EXISTENCE_DECAY, PLACE_RESOLUTION, PredictedTracks
-from stseg.records.sizes import Sizes
+from stseg.records.sizes import Sizes, is_rare_height
 from stseg.tracking.filter.tentative_tracks import SURE_VIEWS, tentative_log_odds
 from stseg.tracking.filter.track_state import BodyPlace, Measurement, PlacePosterior, TrackState
 
@@ -97,7 +97,7 @@ class TrackFilter:
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = self._grounds([*detected, *(predicted[k] for k in missed)])
-        looked_for = tentative_log_odds(ghosts, standing, evidence).items()
+        looked_for = tentative_log_odds(ghosts, standing, evidence, self.body).items()
         tentative = [self._birth(frame, ghosts, j)._replace(log_odds=log_odds) for j, log_odds in looked_for]
         self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
         self._expected = (-1, [])
@@ -140,14 +140,20 @@ class TrackFilter:
         return track.predicted(seconds, self.motion)._replace(log_odds=track.log_odds - EXISTENCE_DECAY * undetected)
 
     def _birth(self, frame: int, people: People, j: int) -> TrackState:
-        """The prior of a new track: near the place, sizes of the population, any velocity."""
+        """The prior of a new track: near the place, sizes of the population, any velocity.
+
+        A rare height stays, and the width with it: no child is found again as an adult.
+        """
         # The body stands there: the place of the track is that less the stray, of which nothing is known.
         spread = np.diag([0.0, 0.0, self.motion.speed_spread**2, self.motion.speed_spread**2, 1.0, 1.0])
         stray = self.body_place.matrix[:, 4:]
         spread[:2, :2] = people.covariance[j] + self.body_place.white * np.eye(2) + stray @ stray.T
         spread[:2, 4:] = spread[4:, :2] = -stray
         state, prior = np.append(people.ground[j], np.zeros(4)), self.body
-        sizes = (prior.height_mean, prior.height_spread**2, prior.width_mean, prior.width_spread**2)
+        height, width = prior.height_mean, prior.width_mean
+        if is_rare_height(people.height[j], prior):
+            height, width = float(people.height[j]), float(people.width[j])
+        sizes = (height, prior.height_spread**2, width, prior.width_spread**2)
         return TrackState(0, frame, frame, state, spread, *sizes, 0.0)
 
 
