@@ -139,7 +139,7 @@ def _fill_boxes(table: BodyTable, ground: Floats, heights: Floats, filled: Float
     for i in range(len(ground)):
         fill_levels(table, ground[i, 0], ground[i, 1], levels)
         fill_discs(levels, heights[i], PROFILE, table.step, discs)
-        filled[i] = box_of(discs, table.breadth)
+        filled[i, 0], filled[i, 1], filled[i, 2], filled[i, 3] = box_of(discs, table.breadth)
 
 
 def inside_bodies(grid: Grid, near_person: Ints, ground: Floats, height: Floats) -> Flags:
