@@ -75,7 +75,7 @@ def fill_offsets(bodies: Floats, boxes: Floats, width: float, height: float, off
     Shares as the tolerances of `half_square`; nan where the pillar is not in the image.
     """
     for i in range(len(bodies)):
-        offsets[i] = _offsets(bodies[i], boxes[i], width, height)
+        offsets[i, 0], offsets[i, 1], offsets[i, 2], offsets[i, 3] = _offsets(bodies[i], boxes[i], width, height)
 
 
 @part

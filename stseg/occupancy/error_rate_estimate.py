@@ -153,7 +153,8 @@ def fill_counts(
         for i in range(len(wrong)):
             all_wrong[i] += wrong[i]
             all_empty[i] += empty[i]
-    errors[:, CLUTTER], trials[:, CLUTTER] = all_wrong, all_empty
+    for i in range(len(wrong)):
+        errors[i, CLUTTER], trials[i, CLUTTER] = all_wrong[i], all_empty[i]
 
 
 @part

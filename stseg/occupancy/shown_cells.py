@@ -186,9 +186,10 @@ def _fill_cells(cells: ShownCells, in_volume: Labels, of_cell: Labels) -> None:
     b = 0
     while b < len(cells.block):
         listed, every, b = adjacent_cells(cells, b)
-        cells.in_volume[listed] = in_volume[every]
-        for one in of_cell[every]:
-            cells.others[one] -= 1
+        target, source, cell = cells.in_volume[listed], in_volume[every], of_cell[every]
+        for k in range(len(target)):
+            target[k] = source[k]
+            cells.others[cell[k]] -= 1
 
 
 @kernel

@@ -119,8 +119,9 @@ def mark_people(reach: Reach, assigned: PixelAssignment, marked: Flags) -> None:
 @kernel
 def fill_empty(cells: ShownCells, unseen: Levels, empty: int, levels: Levels, share: Singles) -> None:
     """Fill levels and share (n + k,) of a view as if it showed nothing; see `CellTables.unseen`."""
-    b, level, sets = 0, np.int16(empty), len(levels) - cells.start[-1]
-    levels[cells.start[-1] :] = unseen[len(unseen) - sets :] | level  # all bits of UNSEEN are set
+    b, level, before = 0, np.int16(empty), len(unseen) - len(levels)
+    for k in range(cells.start[-1], len(levels)):
+        levels[k] = unseen[before + k] | level  # all bits of UNSEEN are set
     while b < len(cells.block):
         listed, every, b = adjacent_cells(cells, b)
         target, source = levels[listed], unseen[every]

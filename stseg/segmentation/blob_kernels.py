@@ -80,7 +80,8 @@ def fill_centroids(
                 centroid[b, 0] += weight * ground[y, x, 0]
                 centroid[b, 1] += weight * ground[y, x, 1]
     for b in range(len(track)):
-        centroid[b] /= total[b]
+        centroid[b, 0] /= total[b]
+        centroid[b, 1] /= total[b]
     return meet
 
 
