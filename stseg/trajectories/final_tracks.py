@@ -97,8 +97,11 @@ def final_tracks(
     kept, dropped = drop_short(committed, frame_rate, config.tracking)
     identity = np.where(np.isin(named, kept), named, 0)
     met = _encounters(rows.events, _Names(track, committed["frame"], identity), frame_rate, config.tracking)
-    renamed = _renamed(rows.events, _Names(track, committed["frame"], named), linked.links)
-    tracks, bridged = bridged[np.isin(bridged["id"], kept)], some_columns(bridged, _PLACED)
+    names = _Names(track, committed["frame"], named)
+    renamed = _renamed(rows.events, names, [link for link in linked.links if names.has(link.identity, link.frame)])
+    is_kept, filled = np.isin(bridged["id"], kept), bridged[len(track) :]
+    is_kept[len(track) :] &= np.array([names.has(int(row["id"]), int(row["frame"])) for row in filled], bool)
+    tracks, bridged = bridged[is_kept], some_columns(bridged, _PLACED)
     del committed
     tracks = filled_gaps(tracks, apart_from(interpolated_rows(tracks, frame_rate, config.tracking), tracks))
     smooth_places(tracks, frame_rate, config.motion)
@@ -190,6 +193,11 @@ class _Names:
         np.minimum.at(since, where, frame)
         np.maximum.at(until, where, frame)
         self.ends = [dict(zip(names.tolist(), frames.tolist(), strict=True)) for frames in (since, until)]
+
+    def has(self, name: int, frame: int) -> bool:
+        """Whether an identity lives in a frame; a row of a short gap may be linked to one that does not."""
+        since, until = (at.get(name, -1) for at in self.ends)
+        return bool(since <= frame <= until)
 
     def name(self, track: int, frame: int) -> int:
         """The identity of a track in a frame, or at its last row before; an unknown track keeps its number."""

@@ -239,3 +239,12 @@ def test_paths_at_once_are_as_alone(one: tuple[Ints, Floats, Floats], other: tup
         alone = smoothed(frames[rows], ground[rows], noise[rows], SMOOTHER_RATE, track[rows])
         np.testing.assert_array_equal(both[0][rows], alone[0])
         np.testing.assert_array_equal(both[1][rows], alone[1])
+
+
+def test_no_row_of_a_gap_outlives_its_person() -> None:
+    """The row that fills a gap of one track is linked, alone, to somebody who had left."""
+    stands = straight(0.0, 0.0, 0.0, 0.0)
+    rows = rows_of({1: (stands, 1.7, range(1, 14)), 2: (stands, 1.6, range(24, 25)), 3: (stands, 1.59, range(22, 26))})
+    rows = rows[(rows["id"] != 3) | (rows["frame"] != 24)]
+    found = whole(committed(rows), lives(rows))
+    assert found.trajectory["frame"].tolist() == list(range(1, 14))
