@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows, columns, ground_of, some_columns
+from stseg.arrays import Flags, Floats, Ints, Rows, columns, ground_of, some_columns
 from stseg.bodies.pillars import BodyTable
 from stseg.config import Config, TrackingConfig
 from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem, Link, associate_globally
@@ -98,9 +98,8 @@ def final_tracks(
     identity = np.where(np.isin(named, kept), named, 0)
     met = _encounters(rows.events, _Names(track, committed["frame"], identity), frame_rate, config.tracking)
     names = _Names(track, committed["frame"], named)
-    renamed = _renamed(rows.events, names, [link for link in linked.links if names.has(link.identity, link.frame)])
-    is_kept, filled = np.isin(bridged["id"], kept), bridged[len(track) :]
-    is_kept[len(track) :] &= np.array([names.has(int(row["id"]), int(row["frame"])) for row in filled], bool)
+    renamed = _renamed(rows.events, names, linked.links)
+    is_kept = np.isin(bridged["id"], kept) & names.are_present(bridged)
     tracks, bridged = bridged[is_kept], some_columns(bridged, _PLACED)
     del committed
     tracks = filled_gaps(tracks, apart_from(interpolated_rows(tracks, frame_rate, config.tracking), tracks))
@@ -159,7 +158,7 @@ def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     for role in ("id", "other"):
         named[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
     born, dead = (np.isin(named["kind"], kind) & np.isin(events["id"], name_at.track) for kind in (b"birth", b"death"))
-    first, last = (np.array([at.get(name, -1) for name in named["id"].tolist()]) for at in name_at.ends)
+    first, last = name_at.ends(named["id"])
     named["frame"][born] = np.maximum(named["frame"], first)[born]
     named["frame"][dead] = np.minimum(named["frame"], last)[dead]
     refuted = (born & (first < named["frame"])) | (dead & (last > named["frame"]))
@@ -168,7 +167,8 @@ def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
         (link.frame, b"hand-over", link.identity, 0, f"goes on as {link.track} of /committed: {link.reason}".encode())
         for link in links
     ]
-    return np.concatenate([named[~(refuted | nowhere)], np.array(joined, EVENT)])
+    passed = np.array(joined, EVENT)
+    return np.concatenate([named[~(refuted | nowhere)], passed[name_at.are_present(passed)]])
 
 
 def _encounters(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
@@ -192,12 +192,17 @@ class _Names:
         since, until = np.full(len(names), np.iinfo(np.int64).max), np.full(len(names), -1)
         np.minimum.at(since, where, frame)
         np.maximum.at(until, where, frame)
-        self.ends = [dict(zip(names.tolist(), frames.tolist(), strict=True)) for frames in (since, until)]
+        self._ends = [dict(zip(names.tolist(), frames.tolist(), strict=True)) for frames in (since, until)]
 
-    def has(self, name: int, frame: int) -> bool:
-        """Whether an identity lives in a frame; a row of a short gap may be linked to one that does not."""
-        since, until = (at.get(name, -1) for at in self.ends)
-        return bool(since <= frame <= until)
+    def ends(self, identity: Ints) -> tuple[Ints, Ints]:
+        """The first and the last frame of identities (n,), int64 (n,) each; -1 for those without a row."""
+        since, until = (np.array([at.get(name, -1) for name in identity.tolist()], np.int64) for at in self._ends)
+        return since, until
+
+    def are_present(self, rows: Rows) -> Flags:
+        """Whether the identities of rows or events (n,) have come and not left; a gap's row may be linked to others."""
+        since, until = self.ends(rows["id"])
+        return np.asarray((since <= rows["frame"]) & (rows["frame"] <= until))
 
     def name(self, track: int, frame: int) -> int:
         """The identity of a track in a frame, or at its last row before; an unknown track keeps its number."""

@@ -248,3 +248,4 @@ def test_no_row_of_a_gap_outlives_its_person() -> None:
     rows = rows[(rows["id"] != 3) | (rows["frame"] != 24)]
     found = whole(committed(rows), lives(rows))
     assert found.trajectory["frame"].tolist() == list(range(1, 14))
+    assert found.events["frame"][found.events["id"] == 1].tolist() == [1, 13]
