@@ -90,9 +90,9 @@ def _gather(sequence: Sequence, matches: list[tuple[Ints, Ints]]) -> Matches:
     away = [frame.person_ground[rows] - frame.track_ground[columns] for frame, (rows, columns) in found]
     distance = [np.hypot(one[:, 0], one[:, 1]) for one in away]
     predicted = [frame.predicted[columns] for frame, (_, columns) in found]
-    starts = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool)
-    columns = zip(starts, (person, track, distance, predicted), strict=True)
-    return Matches(frame, *(np.concatenate([start, *parts]) for start, parts in columns))
+    persons, tracks = np.concatenate([index[:0], *person]), np.concatenate([index[:0], *track])
+    distances, are_predicted = np.concatenate([np.zeros(0), *distance]), np.concatenate([np.zeros(0, bool), *predicted])
+    return Matches(frame, persons, tracks, distances, are_predicted)
 
 
 def idf1(sequence: Sequence, gate: float) -> float:

@@ -99,8 +99,7 @@ def final_tracks(
     met = _encounters(rows.events, _Names(track, committed["frame"], identity), frame_rate, config.tracking)
     names = _Names(track, committed["frame"], named)
     renamed = _renamed(rows.events, names, linked.links)
-    is_kept = np.isin(bridged["id"], kept) & names.are_present(bridged)
-    tracks, bridged = bridged[is_kept], some_columns(bridged, _PLACED)
+    tracks, bridged = bridged[np.isin(bridged["id"], kept) & names.are_present(bridged)], some_columns(bridged, _PLACED)
     del committed
     tracks = filled_gaps(tracks, apart_from(interpolated_rows(tracks, frame_rate, config.tracking), tracks))
     smooth_places(tracks, frame_rate, config.motion)

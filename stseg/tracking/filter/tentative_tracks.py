@@ -30,13 +30,13 @@ def tentative_log_odds(
 ) -> dict[int, float]:
     """Log-odds of the rejected candidates that become tentative tracks, by their index, nats.
 
-    None begins near the places of other tracks, `standing` float64 (n, 2), metres. `evidence` is that of the views.
+    None begins near the places of other tracks, `standing` float64 (n, 2), metres. `evidence` is that of the views,
+    `body` the population.
     """
     has_boxes = any(isinstance(view, Boxes) for view in evidence)
     is_repeated = has_boxes | ((ghosts.view_evidence != 0).sum(0) < SURE_VIEWS)
     log_odds = ghosts.evidence - np.where(is_repeated, _REPEATED_EVIDENCE, 0.0)
     distance = distances(ghosts.ground, standing).min(1, initial=np.inf)
     is_apart = distance >= np.where(is_repeated, EXCLUSION_RADIUS, _SURE_RADIUS)
-    is_rare = is_rare_height(ghosts.height, body) & ~is_repeated
-    rare = np.where(is_rare, log_population_height(ghosts.height, body), 0.0)
+    rare = np.where(is_rare_height(ghosts.height, body) & ~is_repeated, log_population_height(ghosts.height, body), 0.0)
     return {j: float(log_odds[j]) for j in np.flatnonzero(is_apart & (log_odds - rare > _LEAST_LOG_ODDS)).tolist()}

@@ -140,10 +140,7 @@ class TrackFilter:
         return track.predicted(seconds, self.motion)._replace(log_odds=track.log_odds - EXISTENCE_DECAY * undetected)
 
     def _birth(self, frame: int, people: People, j: int) -> TrackState:
-        """The prior of a new track: near the place, sizes of the population, any velocity.
-
-        A rare height stays, and the width with it: no child is found again as an adult.
-        """
+        """The prior of a new track: near the place, any velocity, sizes of the population or a rare height as it is."""
         # The body stands there: the place of the track is that less the stray, of which nothing is known.
         spread = np.diag([0.0, 0.0, self.motion.speed_spread**2, self.motion.speed_spread**2, 1.0, 1.0])
         stray = self.body_place.matrix[:, 4:]
