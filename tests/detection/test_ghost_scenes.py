@@ -188,11 +188,11 @@ def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
     assert len(who) == 1
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_child_comes_to_light(kind: str) -> None:
+@pytest.mark.parametrize(("kind", "number"), [("pixels", 2), ("pixels", 3), ("boxes", 3)])
+def test_a_child_comes_to_light(kind: str, number: int) -> None:
     """No frame is sure of one who appears between adults, but the evidence of few frames adds up."""
-    rig, body = rig_of(corner_cameras()[:3]), replace(BODY, heights=(1.0, 1.25, 1.6, 1.7, 1.8))
-    detector, follow = Detector(rig, [kind] * 3, FEW_HEIGHTS, body), TrackFilter(8.0, replace(CONFIG, body=body))
+    rig, body = rig_of(corner_cameras()[3 - number : 3]), replace(BODY, heights=(1.0, 1.25, 1.6, 1.7, 1.8))
+    detector, follow = Detector(rig, [kind] * number, FEW_HEIGHTS, body), TrackFilter(8.0, replace(CONFIG, body=body))
     adults, child = people((-1.0, -0.6), (1.0, 0.9, 1.8)), people((0.0, 0.8, 1.0))
     for frame, standing in enumerate([adults, adults, *[np.concatenate([adults, child])] * 3]):
         views = evidence_of(kind, rig.cameras, standing)

@@ -11,8 +11,8 @@ from stseg.records.people import People
 from stseg.records.sizes import is_rare_height, log_population_height
 
 _LEAST_LOG_ODDS = -6.0
-"""Log-odds below which a rejected candidate starts no tentative track, nats; what a rare height costs is left out where
-evidence adds up in full."""
+"""Log-odds below which a rejected candidate starts no tentative track, nats; without what a rare height costs where all
+views deliver pixels: broken boxes show rare heights, frame after frame."""
 _REPEATED_EVIDENCE = 2.0
 """Part of a rejected candidate's evidence that the next frame repeats, nats: in rigs with boxes, where a detector's
 errors last, and by fewer than `SURE_VIEWS`, where ghosts last in which two silhouettes meet."""
@@ -38,5 +38,6 @@ def tentative_log_odds(
     log_odds = ghosts.evidence - np.where(is_repeated, _REPEATED_EVIDENCE, 0.0)
     distance = distances(ghosts.ground, standing).min(1, initial=np.inf)
     is_apart = distance >= np.where(is_repeated, EXCLUSION_RADIUS, _SURE_RADIUS)
-    rare = np.where(is_rare_height(ghosts.height, body) & ~is_repeated, log_population_height(ghosts.height, body), 0.0)
+    is_child = is_rare_height(ghosts.height, body) & (not has_boxes)
+    rare = np.where(is_child, log_population_height(ghosts.height, body), 0.0)
     return {j: float(log_odds[j]) for j in np.flatnonzero(is_apart & (log_odds - rare > _LEAST_LOG_ODDS)).tolist()}
