@@ -119,12 +119,11 @@ def _scores(row: Row | None) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure the sets that are asked for, then write the page."""
-    parser = command_line(__doc__)
+    parser = command_line(__doc__, jobs=1)
     parser.add_argument("--sets", default=",".join(SETS), help="names of sets; none for the page alone")
     parser.add_argument("--variants", default=",".join(VARIANTS), help=f"of {', '.join(VARIANTS)}")
-    parser.add_argument("--jobs", type=int, default=1, help="runs at once")
     asked = parser.parse_args(arguments)
-    bench = Bench(asked.data.resolve(), asked.work.resolve())
+    bench = Bench.of(asked)
     names = [] if asked.sets == "none" else asked.sets.split(",")
     for chosen, known in ((names, SETS), (asked.variants.split(","), VARIANTS)):
         unknown = [name for name in chosen if name not in known]

@@ -5,9 +5,12 @@ import csv
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 MADE = ROOT / "build" / "results"
@@ -23,6 +26,11 @@ class Bench:
 
     data: Path
     work: Path
+
+    @classmethod
+    def of(cls, asked: argparse.Namespace) -> "Bench":
+        """The folders of a command line."""
+        return cls(asked.data.resolve(), asked.work.resolve())
 
     def path(self, text: str) -> Path:
         """A path written with $DATA or $WORK."""
@@ -49,13 +57,21 @@ class Bench:
         return sorted(str(path) for path in Path("/").glob(filled.lstrip("/"))) or [filled]
 
 
-def command_line(text: str | None) -> argparse.ArgumentParser:
-    """A command line with its help, and the folders that most tools work with."""
+def command_line(text: str | None, **numbers: int) -> argparse.ArgumentParser:
+    """A command line with its help, the folders that most tools work with, and options of whole numbers."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=ROOT / "../shared/data", help="folder of data sets")
     parser.add_argument("--work", type=Path, default=MADE, help="folder for what is made")
     parser.add_argument("-o", "--output", type=Path, default=MADE, metavar="FOLDER", help="of the tables")
+    for option, default in numbers.items():
+        parser.add_argument(f"--{option}", type=int, default=default, help=f"{default} if not given")
     return parser
+
+
+def in_processes(work: Callable[..., Any], tasks: Iterable[Sequence[object]], jobs: int) -> Iterator[Any]:
+    """What `work` returns of each task's arguments, in their order, by so many fresh processes."""
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        yield from pool.map(work, *zip(*tasks, strict=True))
 
 
 def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:

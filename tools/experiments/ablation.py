@@ -8,16 +8,14 @@ compared with the run of the same perturbation with everything on. Lines of othe
 
 import csv
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 from measure import Tracked, final_rows, prepare, scored, tracked
 from result_sets import SETS, ResultSet
-from workbench import Bench, command_line, commit, write_table
+from workbench import Bench, command_line, commit, in_processes, write_table
 
 from stseg.config import Config
 from stseg.detection.search.frame_search import FrameSearch
@@ -103,23 +101,20 @@ def run(name: str, bench: Bench, mechanisms: list[str], seed: int) -> list[list[
 
 def main() -> None:
     """Measure, set by set."""
-    parser = command_line(__doc__)
+    parser = command_line(__doc__, runs=4, jobs=2)
     parser.add_argument("--sets", default=",".join(CUTS))
     parser.add_argument("--mechanisms", default=",".join(WHOLE | FINAL))
-    parser.add_argument("--runs", type=int, default=4)
-    parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
-    bench, mechanisms = Bench(asked.data.resolve(), asked.work.resolve()), asked.mechanisms.split(",")
+    bench, mechanisms = Bench.of(asked), asked.mechanisms.split(",")
     table = asked.output / "ablation.csv"
     lines = {tuple(line[:2]): line for line in csv.reader(table.open())} if table.exists() else {}
     lines["mechanism", "set"] = ["mechanism", "set", "runs", "moda", "idf1", "switches", "commit"]
     for name in asked.sets.split(","):
         prepare(CUTS[name], bench)
         seeds, found = range(1, asked.runs + 1), []
-        with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-            for scores in pool.map(run, *zip(*[(name, bench, mechanisms, seed) for seed in seeds], strict=True)):
-                found.append(scores)
-                print(name, len(found), scores, flush=True)
+        for scores in in_processes(run, [(name, bench, mechanisms, seed) for seed in seeds], asked.jobs):
+            found.append(scores)
+            print(name, len(found), scores, flush=True)
         change = np.array(found)[:, 1:] - np.array(found)[:, :1]
         mean, error = change.mean(0), change.std(0, ddof=1) / np.sqrt(asked.runs)
         for k, mechanism in enumerate(mechanisms):

@@ -8,14 +8,12 @@ stated and less is more exact than stated; and between two people, which identit
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from itertools import combinations
-from multiprocessing import get_context
 
 import numpy as np
 from measure import prepare, tracked
 from result_sets import SETS
-from workbench import Bench, command_line, commit, write_table
+from workbench import Bench, command_line, commit, in_processes, write_table
 
 from stseg.arrays import Floats, Ints, Rows, ground_of
 from stseg.config import Config
@@ -72,18 +70,15 @@ def run(name: str, bench: Bench, seed: int) -> Floats:
 
 def main() -> None:
     """Measure, a line for each set and kind of size."""
-    parser = command_line(__doc__)
+    parser = command_line(__doc__, runs=2, jobs=2)
     parser.add_argument("--sets", default="laboratory,cmc1,cmc2,cmc2_fairmot_features,wildtrack,uu4_colour,easy,dense4")
-    parser.add_argument("--runs", type=int, default=2)
-    parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
-    bench, kinds = Bench(asked.data.resolve(), asked.work.resolve()), ("halves", "tracklets", "pairs")
+    bench, kinds = Bench.of(asked), ("halves", "tracklets", "pairs")
     lines: list[Sequence[object]] = [["set", "size", *kinds, *(f"{kind}_freedom" for kind in kinds), "commit"]]
     for name in asked.sets.split(","):
         prepare(SETS[name], bench)
         tasks = [(name, bench, seed) for seed in range(1, asked.runs + 1)]
-        with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-            whole = np.sum(list(pool.map(run, *zip(*tasks, strict=True))), axis=0)
+        whole = np.sum(list(in_processes(run, tasks, asked.jobs)), axis=0)
         for size, (squares, freedom) in zip(("height", "appearance"), np.moveaxis(whole, 2, 0), strict=True):
             if freedom.any():
                 means = [f"{s / n:.2f}" if n else "" for s, n in zip(squares, freedom, strict=True)]

@@ -11,15 +11,13 @@ choices are tried, evenly among all.
 
 import re
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import combinations
-from multiprocessing import get_context
 
 import numpy as np
 from measure import final_rows, prepare, scored, scored_area, tracked
 from result_sets import SETS, ResultSet
-from workbench import Bench, command_line, commit, write_table
+from workbench import Bench, command_line, commit, in_processes, write_table
 
 from stseg.arrays import Floats
 from stseg.config import Config
@@ -70,12 +68,10 @@ def line(name: str, chosen: Sequence[Cameras], found: Floats) -> list[object]:
 
 def main() -> None:
     """Write the table, after each line."""
-    parser = command_line(__doc__)
+    parser = command_line(__doc__, runs=4, frames=60, choices=6, jobs=2)
     parser.add_argument("--only", default=".", help="of the recordings' names")
-    for option, default in (("runs", 4), ("frames", 60), ("choices", 6), ("jobs", 2)):
-        parser.add_argument(f"--{option}", type=int, default=default)
     asked = parser.parse_args()
-    bench, lines = Bench(asked.data.resolve(), asked.work.resolve()), list[list[object]]()
+    bench, lines = Bench.of(asked), list[list[object]]()
     for name, one in recordings(asked.frames).items():
         if not re.search(asked.only, name):
             continue
@@ -83,8 +79,7 @@ def main() -> None:
         for number in _VIEWS:
             chosen = choices(one.views, number, asked.choices)
             runs = [(one, bench, cameras, seed) for cameras in chosen for seed in range(1, asked.runs + 1)]
-            with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-                found = np.array(list(pool.map(run, *zip(*runs, strict=True))))
+            found = np.array(list(in_processes(run, runs, asked.jobs)))
             lines.append(line(name, chosen, found.reshape(len(chosen), asked.runs, -1)))
             print(*lines[-1], flush=True)
             write_table(asked.output / "few_views.csv", [_HEAD, *lines])

@@ -6,13 +6,11 @@ Crowds are chaotic: one run says little.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 
 import numpy as np
 from measure import final_rows, prepare, scored, tracked
 from result_sets import SETS
-from workbench import Bench, command_line, commit, write_table
+from workbench import Bench, command_line, commit, in_processes, write_table
 
 from stseg.io.config_file import read_config
 
@@ -28,19 +26,16 @@ def run(name: str, bench: Bench, settings: Sequence[str], seed: int) -> list[flo
 
 def main() -> None:
     """Measure, a line for each set."""
-    parser = command_line(__doc__)
+    parser = command_line(__doc__, runs=8, jobs=2)
     parser.add_argument("--sets", default="laboratory,cmc1,cmc2,cmc2_fairmot_features,wildtrack,uu4,easy,dense4")
-    parser.add_argument("--runs", type=int, default=8)
-    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="stage.key=value")
     asked = parser.parse_args()
-    bench = Bench(asked.data.resolve(), asked.work.resolve())
+    bench = Bench.of(asked)
     rows = []
     for name in asked.sets.split(","):
         prepare(SETS[name], bench)
-        seeds = range(1, asked.runs + 1)
-        with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-            found = np.array(list(pool.map(run, *zip(*[(name, bench, asked.settings, k) for k in seeds], strict=True))))
+        tasks = [(name, bench, asked.settings, seed) for seed in range(1, asked.runs + 1)]
+        found = np.array(list(in_processes(run, tasks, asked.jobs)))
         mean, spread = found.mean(0), found.std(0, ddof=1) if asked.runs > 1 else np.zeros(len(SCORES))
         rows.append([name, asked.runs, *(f"{m:.1f} ± {s:.1f}" for m, s in zip(mean, spread, strict=True)), commit()])
         print(", ".join(map(str, rows[-1])), flush=True)

@@ -143,7 +143,7 @@ def cropped(camera: Camera, corner: Ints, size: tuple[int, int]) -> Camera:
 def main() -> None:
     """Measure, rig by rig."""
     asked, rows = command_line(__doc__).parse_args(), [["rig", "distances", "floor error %", "error %", "stated %"]]
-    bench = Bench(asked.data.resolve(), asked.work.resolve())
+    bench = Bench.of(asked)
     for name, rig, ground, people in chain(real(bench), map(room, range(_ROOMS))):
         places, names = np.random.default_rng(0).choice(ground, _PLACES), [camera.name for camera in rig.cameras]
         known = list(distances(rig, places))

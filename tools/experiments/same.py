@@ -122,15 +122,14 @@ def differences(before: dict[str, str], now: dict[str, str]) -> list[str]:
 
 def main() -> None:
     """Compare, a line for each recording."""
-    parser = command_line(__doc__)
+    parser = command_line(__doc__, jobs=2)
     parser.add_argument("base", help="the commit to compare with")
     parser.add_argument("--sets", default="", help="names, by comma; all if not given")
     parser.add_argument("--quick", action="store_true", help="the first frames of each recording, without the demo")
-    parser.add_argument("--jobs", type=int, default=2, help="runs at the same time")
     asked = parser.parse_args()
     base = subprocess.run(["git", "rev-parse", asked.base], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     sha = base.stdout.strip()[:12]
-    bench = Bench(asked.data.resolve(), asked.work.resolve())
+    bench = Bench.of(asked)
     folder = checkout(sha, bench.work)
     names = [name for name in asked.sets.split(",") if name]
     chosen = [one for one in _ALL if not names or one.name in names]
