@@ -25,6 +25,8 @@ _HEIGHTS = (0.7, 1.3)
 """Heights of boxes that fit, in mean heights of a body."""
 _GREATEST_PACE, _LEAST_PACE = 12.0, 0.01
 """Median speed, m/s, above which, and 90 % quantile, body heights a second, below which a frame rate is doubted."""
+_STEP_TIME, _STEP_FRAMES = 0.1, 4
+"""Time of a step, seconds, and most frames of it: in a shorter one a detector's errors are larger than steps."""
 _RATES = (0.2, 250.0)
 """Usual frame rates, frames per second."""
 _FARTHEST = 150.0
@@ -105,16 +107,15 @@ def twin_warnings(names: Sequence[str], boxes: Sequence[Floats]) -> list[str]:
 
 def pace_warnings(frame_rate: float, frame: Ints, ground: Floats, height: float) -> list[str]:
     """A warning where people, float64 (n, 2) metres in frames (n,), would walk at no pace of people."""
-    order = np.argsort(frame, kind="stable")
-    frame, ground = frame[order], ground[order]
-    steps = list[Floats]()
-    begins = np.flatnonzero(np.diff(frame, prepend=frame[:1] - 1))
-    ends = np.append(begins[1:], len(frame))
-    for k in range(0, len(begins) - 1, max(1, len(begins) * 10 // _MOST_BOXES)):
-        if frame[begins[k + 1]] == frame[begins[k]] + 1:
-            here, later = ground[begins[k] : ends[k]], ground[begins[k + 1] : ends[k + 1]]
-            steps.append(np.hypot(*(later[:, None] - here[None]).T).min(axis=1))
-    speed = np.concatenate([*steps, np.zeros(0)]) * frame_rate
+    ground = ground[np.argsort(frame, kind="stable")]
+    lag = min(max(round(_STEP_TIME * frame_rate), 1), _STEP_FRAMES)
+    frames, number = np.unique(frame, return_counts=True)
+    standing, steps = np.split(ground, np.cumsum(number)[:-1]), list[Floats]()
+    has_later = np.flatnonzero(np.isin(frames + lag, frames))
+    for k in has_later[:: max(1, len(frames) * 10 // _MOST_BOXES)].tolist():
+        here, later = standing[k], standing[int(np.searchsorted(frames, frames[k] + lag))]
+        steps.append(np.hypot(*(later[:, None] - here[None]).T).min(axis=1))
+    speed = np.concatenate([*steps, np.zeros(0)]) * frame_rate / lag
     if len(speed) < _LEAST_BOXES:
         return []
     if (middle := float(np.median(speed))) > _GREATEST_PACE:

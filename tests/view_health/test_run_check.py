@@ -231,6 +231,13 @@ def test_what_is_right_is_not_doubted_but_a_pace_of_nobody(
         assert "are frame_rate and" in pace_warnings(1000 * recording.rig.frame_rate, *one.feet(), HEIGHT)[0]
 
 
+def test_feet_that_jump_from_frame_to_frame_are_no_pace() -> None:
+    frame = np.repeat(np.arange(90), 3)
+    standing = np.array([[0.0, 0.0], [6.0, 0.0], [0.0, 6.0]])[np.arange(270) % 3]
+    walking = standing + (1.2 * frame / 30)[:, None] + np.random.default_rng(6).normal(0, 0.4, (270, 2))
+    assert pace_warnings(30.0, frame, walking, HEIGHT) == []
+
+
 SHIFTED = "people stand where other cameras see them hardly more often than by chance"
 CENTRES = SHIFTED + ": are left and top the centres of its boxes?"
 
