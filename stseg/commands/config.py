@@ -10,10 +10,7 @@ from stseg.io.config_file import describe_config, read_config
 
 
 def config(
-    *,
-    config: Path | None = None,
-    set_: Settings = (),
-    expert: Annotated[bool, Parameter(negative="")] = False,
+    *, config: Path | None = None, set_: Settings = (), expert: Annotated[bool, Parameter(negative="")] = False
 ) -> None:
     """Print the configuration, with the meaning and unit of every key, as a TOML file.
 

@@ -25,7 +25,7 @@ class DetectionConfig(Settings):
     box_log_ratio: float = positive(4.5)
     """Log-likelihood ratio, person against clutter, of a box that fits perfectly, nats."""
     box_miss_rate: float = share(0.20)
-    """Probability that a detector misses a fully visible person, 0..1."""
+    """Probability that a detector misses a fully visible person, 0..1; the least that a run learns."""
     full_visibility: float = within(0.90, lambda value: 0 < value <= 1, "above 0, at most 1")
     """Visible share of a body from which a detector finds it as if fully visible, 0..1; below, in proportion."""
     hidden_detection_rate: float = share(0.02)

@@ -201,7 +201,9 @@ class Detector:
         self, learned: Estimates, observations: ViewObservations, predicted: PredictedTracks | None
     ) -> FrameEvidence:
         """Evidence of a frame by what has been learned, under the prior of its predicted tracks."""
-        return self.evidence(learned.rims.applied(observations), self._prior(predicted, learned.population.body))
+        applied, prior = learned.rims.applied(observations), self._prior(predicted, learned.population.body)
+        parameters = self.parameters._replace(box_miss_rate=learned.box_noise.miss_rate(self.config.box_miss_rate))
+        return FrameEvidence(self.views, applied, prior, parameters, self.pixel_lattice)
 
     def _learn_first_rims(self, learned: Estimates, observations: ViewObservations, searches: int) -> None:
         """Learn the rims of a young session before its frame is explained, as if births cost nothing.

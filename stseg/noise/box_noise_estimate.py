@@ -1,4 +1,4 @@
-"""Noise of boxes, learned from the frames that are explained: one table for all views.
+"""Noise of boxes and the rate of missing ones, learned from the frames that are explained: for all views together.
 
 A box moves the place at which its person is found, so its offsets from that person are smaller than its errors. With
 v the variance of an offset r over the posterior of place and height, and t the tolerance of the box, a share v / t^2 of
@@ -15,6 +15,10 @@ lower edge counts by the probability that it is at the feet, with h / (1 - h) th
 where it ends r above the feet, with l the limit of `stseg.bodies.box_fit` and t^2 = 2 sigma^2. The mean of p(hidden) is
 h, one of boxes whose feet another box covers, and one of all others. People count for a view where the rest of the
 evidence supports them, and boxes at the border of the image, which are cut there, do not count.
+
+Detectors miss people who are small in the image, or look unlike those of their training. People who count, and whom a
+view sees whole past the others, are missed where no box is theirs. The configured rate of misses is the first guess and
+the least: whom a detector misses often is seldom found.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,7 +49,7 @@ _POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 
 
 class BoxNoiseEstimate:
-    """Accumulated squared offsets of boxes; `scale` is that of `BoxNoise`, others as of `stseg.noise.estimates`."""
+    """Accumulated offsets and misses of boxes; `scale` is that of `BoxNoise`, others as of `stseg.noise.estimates`."""
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig, scale: float = 1.0) -> None:
         self._config, self._scale = config, scale
@@ -53,6 +57,8 @@ class BoxNoiseEstimate:
         """(knot, 2, 4): degrees of freedom, and squared offsets; both times seconds."""
         self.feet = Forgetting((2, 2), frame_rate, config.memory)
         """(covered, 2): boxes, and those whose feet are hidden; both times seconds."""
+        self.misses = Forgetting((2,), frame_rate, config.memory)
+        """(2,): people whom views see whole, and those of them without a box; both times seconds."""
 
     @property
     def noise(self) -> BoxNoise:
@@ -64,10 +70,17 @@ class BoxNoiseEstimate:
         boxes, hidden = self.feet.with_prior(weight, np.column_stack([np.ones(2), PRIOR_NOISE.hidden_feet])).T
         return BoxNoise(spread, hidden / boxes, self._scale)
 
+    def miss_rate(self, first: float) -> float:
+        """The rate at which whole people are missed, by all frames so far, 0..1; `first` is the configured one."""
+        people, missed = self.misses.with_prior(self._config.prior_weight, np.array([1.0, first]))
+        return max(float(missed / people), first)
+
     def learn(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> None:
         """Count one frame."""
         self.offsets.forget()
         self.feet.forget()
+        self.misses.forget()
+        self.misses.add(self.misses.seconds(self._misses(explanation, views, observations)))
         for k, person, observation, box in explained_boxes(explanation, views, observations, self._config):
             edges, tolerance = observation.edges[box], observation.tolerance[box]
             counted, feet = _counted(views[k], explanation.people, person, edges, tolerance)
@@ -77,6 +90,15 @@ class BoxNoiseEstimate:
             lower, share = knots_of(observation.score[box])
             for knot, part in ((lower, 1 - share), (lower + 1, share)):
                 np.add.at(self.offsets.sums, knot, self.offsets.seconds(counted * part[:, None, None]))
+
+    def _misses(self, explanation: Explanation, views: Sequence[View], observations: ViewObservations) -> Floats:
+        """Number of people whom the other views support and each view sees whole, and of those without a box, (2,)."""
+        people, owners, number = explanation.people, explanation.box_assignment, np.zeros(2)
+        for k, (view, observation, owner) in enumerate(zip(views, observations, owners, strict=True)):
+            if isinstance(view, BoxView) and observation is not None:
+                counted = np.flatnonzero(people.supported_without(k, self._config.minimum_evidence) & people.is_free[k])
+                number += len(counted), len(np.setdiff1d(counted, owner))
+        return number
 
 
 def explained_boxes(

@@ -19,7 +19,7 @@ class Estimates:
 
     box_noise: BoxNoiseEstimate
     box_bias: BoxBiasEstimate
-    """Noise of detectors' boxes, and the mean error of their lower edges."""
+    """Noise of detectors' boxes with the rate of missing ones, and the mean error of their lower edges."""
     population: PopulationEstimate
     """Sizes of people."""
     rims: RimEstimate

@@ -79,14 +79,7 @@ def correct(run: Run | Path | str, answers: Path | str, output: Path | str, *, o
     given = tuple(Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows)
     corrected = corrected_tracks(found, given)
     write_corrected(
-        found.path,
-        output,
-        corrected.tracks,
-        corrected.answered,
-        corrected.new_ids,
-        corrected.names,
-        text,
-        overwrite,
+        found.path, output, corrected.tracks, corrected.answered, corrected.new_ids, corrected.names, text, overwrite
     )
     return CorrectedRun(read_run(output), given)
 

@@ -79,12 +79,7 @@ def simulate(
     film = SceneFilm(replace(NAMED[scene], **given), errors)
     with reporter_of(progress).progress("filming", film.spec.frames) as advance:
         write_scene(
-            folder,
-            film,
-            body=_body(film.spec),
-            instances=instances,
-            overwrite=overwrite,
-            frame_done=lambda: advance(1),
+            folder, film, body=_body(film.spec), instances=instances, overwrite=overwrite, frame_done=lambda: advance(1)
         )
     return SimulatedRecording(
         folder / rig_name(film.spec.kinds[0]), folder / "truth.csv", film.spec.frames, len(film.rig.cameras)

@@ -20,11 +20,7 @@ _SHIFTS = np.arange(-_GREATEST_RESIDUAL, _GREATEST_RESIDUAL + _RESIDUAL_STEP / 2
 
 
 def reprojection_residuals(
-    people: Candidates,
-    views: Sequence[DetectorView],
-    observations: ViewObservations,
-    boxes: list[Ints],
-    free: Flags,
+    people: Candidates, views: Sequence[DetectorView], observations: ViewObservations, boxes: list[Ints], free: Flags
 ) -> Floats:
     """Mean residual of each view.
 

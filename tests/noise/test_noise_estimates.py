@@ -94,6 +94,21 @@ def test_the_spread_of_boxes_and_hidden_feet_are_found(spread: float, hidden: fl
     np.testing.assert_allclose(learned.spread[:-2], PRIOR_NOISE.spread[:-2])
 
 
+@pytest.mark.parametrize(("share", "rate"), [(0.0, 0.2), (0.4, 0.4), (0.6, 0.6)])
+def test_the_share_of_missing_boxes_is_found(share: float, rate: float) -> None:
+    rng, frame_pass, estimate = (
+        np.random.default_rng(4),
+        detector_of(room(), "boxes"),
+        BoxNoiseEstimate(RATE, CONFIG),
+    )
+    for _ in range(150):
+        seen = shaken_boxes(frame_pass, people((-0.8, 0.3), (0.7, -0.6), (0.6, 0.8)), 0.02, 1.0, rng)
+        kept = [rng.random(len(boxes.score)) >= share for boxes in seen]
+        views = [Boxes(boxes.pixel[some], boxes.score[some]) for boxes, some in zip(seen, kept, strict=True)]
+        estimate.learn(frame_pass.explain(views, None), frame_pass.views, frame_pass.observe(views))
+    assert estimate.miss_rate(0.2) == pytest.approx(rate, abs=0.05)
+
+
 def test_feet_are_covered_by_a_box_that_ends_lower() -> None:
     """The first stands behind the second, not behind the third beside it, nor behind a box of the same person."""
     edges = np.array([[10.0, 10, 30, 60], [15, 20, 40, 80], [32, 20, 60, 90], [11, 10, 31, 61]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import chain, takewhile
 from pathlib import Path
@@ -122,14 +122,14 @@ class Followed:
 def _follow(
     job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporter: Reporter, receiver: Receiver | None
 ) -> Followed | None:
-    live = is_live(job.recording)
+    live, rate = is_live(job.recording), job.recording.rig.frame_rate
     finished = _kept(folder, live, reporter)
     stop = finished[-1].segment.stop if finished else 0
     total = None if job.stop == ENDLESS else job.stop
     with (
         stop_asked() as halt,
-        LiveTable(live_table_of(output), job.recording.rig.frame_rate, stop) as table,
-        _publisher(receiver, job.recording.rig.frame_rate, reporter) as publisher,
+        LiveTable(live_table_of(output), rate, stop) as table,
+        nullcontext() if receiver is None else Publisher(receiver, rate, reporter.note) as publisher,
         reporter.progress("following", total, stop) as advance,
     ):
         corrections = CorrectionTable(live_corrections_of(output), stop)
@@ -149,12 +149,6 @@ def _follow(
     assemble(whole, finished, folder.result)
     folder.publish(overwrite)
     return Followed(read_run(output), follower.delay)
-
-
-def _publisher(
-    receiver: Receiver | None, frame_rate: float, reporter: Reporter
-) -> AbstractContextManager[Publisher | None]:
-    return nullcontext() if receiver is None else Publisher(receiver, frame_rate, reporter.note)
 
 
 def live_table_of(output: Path) -> Path:
