@@ -111,8 +111,8 @@ def pace_warnings(frame_rate: float, frame: Ints, ground: Floats, height: float)
     lag = min(max(round(_STEP_TIME * frame_rate), 1), _STEP_FRAMES)
     frames, number = np.unique(frame, return_counts=True)
     standing, steps = np.split(ground, np.cumsum(number)[:-1]), list[Floats]()
-    has_later = np.flatnonzero(np.isin(frames + lag, frames))
-    for k in has_later[:: max(1, len(frames) * 10 // _MOST_BOXES)].tolist():
+    begins = np.flatnonzero(np.isin(frames + lag, frames))
+    for k in begins[:: max(1, len(frames) * 10 // _MOST_BOXES)].tolist():
         here, later = standing[k], standing[int(np.searchsorted(frames, frames[k] + lag))]
         steps.append(np.hypot(*(later[:, None] - here[None]).T).min(axis=1))
     speed = np.concatenate([*steps, np.zeros(0)]) * frame_rate / lag

@@ -44,6 +44,7 @@ WHOLE: dict[str, tuple[str, Any]] = {
     "hard core": (f"{_DETECTOR}.CORE_MARGIN", 0.3),
     "window existence": ("stseg.trackers.window_existence.WindowExistence.revised", _unrevised),
     "noise of boxes": ("stseg.noise.box_noise_estimate.BoxNoiseEstimate.learn", lambda *_: None),
+    "missing boxes": ("stseg.noise.box_noise_estimate.BoxNoiseEstimate.miss_rate", lambda _, first: first),
     "bias of boxes": ("stseg.noise.box_bias_estimate.BoxBiasEstimate.learn", lambda *_: None),
     "population": ("stseg.noise.population_estimate.PopulationEstimate.learn", lambda *_: None),
     "rims of the first frame": (f"{_DETECTOR}.Detector._learn_first_rims", lambda *_: None),
@@ -69,6 +70,7 @@ def _simulated(name: str, rig: str, options: str) -> ResultSet:
 
 _PAIR = SETS["uu4"].prepare[0].replace("cam?/config.xml", "cam1/config.xml $DATA/uu4/cam3/config.xml")
 _CROWD = "--scene dense4 --size 320,240"
+_FAR = "--scene plaza --people 12 --cameras 4 --size 640,480"
 CUTS = {
     "laboratory": replace(SETS["laboratory"], frames="0:250"),
     "cmc2": SETS["cmc2"],
@@ -79,6 +81,7 @@ CUTS = {
     "spoiled_boxes": _simulated("doubled", "rig_boxes", f"{_CROWD} --spoil doubled --spoil jitter --spoil missed"),
     "children": _simulated("children", "rig_masks", "--scene school --size 320,240"),
     "wide": _simulated("wide", "rig_masks", "--scene plaza"),
+    "missed": _simulated("missed", "rig_boxes", f"{_FAR} --spoil jitter --spoil missed"),
 }
 """The sets, some of them short."""
 

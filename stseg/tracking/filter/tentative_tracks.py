@@ -38,6 +38,6 @@ def tentative_log_odds(
     log_odds = ghosts.evidence - np.where(is_repeated, _REPEATED_EVIDENCE, 0.0)
     distance = distances(ghosts.ground, standing).min(1, initial=np.inf)
     is_apart = distance >= np.where(is_repeated, EXCLUSION_RADIUS, _SURE_RADIUS)
-    is_child = is_rare_height(ghosts.height, body) & (not has_boxes)
-    rare = np.where(is_child, log_population_height(ghosts.height, body), 0.0)
+    is_rare = is_rare_height(ghosts.height, body) & (not has_boxes)
+    rare = np.where(is_rare, log_population_height(ghosts.height, body), 0.0)
     return {j: float(log_odds[j]) for j in np.flatnonzero(is_apart & (log_odds - rare > _LEAST_LOG_ODDS)).tolist()}
