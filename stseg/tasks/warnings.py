@@ -21,7 +21,7 @@ _BLIND_SHARE = 0.05
 """Share of the ground that no view sees from which there is a warning."""
 _CHECKED_FRAMES = 160
 """Frames by which swapped cameras are found where a view looks wrong."""
-_DOUBTFUL_MISSES = 0.1
+_DOUBTFUL_MISSES = 0.12
 """Miss rate from which they are looked for: swaps leave 0.13 to 0.8, right views 0.03 to 0.1, in crowds more."""
 _UNLIKE = 1.4
 """Least ratio of that rate to the least one of all views or to the first guess: swaps leave 1.7 or more."""
@@ -46,7 +46,7 @@ def run_warnings(run: Run, of_sources: Sequence[str] | None = None) -> list[str]
         *_brief_backgrounds(run),
         *explained_by_swap(
             run.recording,
-            int(run.frames[0]),
+            (int(run.frames[0]), int(run.frames[-1]) + 1),
             [
                 *(source_warnings(run.recording) if of_sources is None else of_sources),
                 *_missing_images(run.recording),
@@ -110,21 +110,24 @@ def _are_misses_doubtful(run: Run, guess: float) -> bool:
     return bool(misses) and max(misses) > max(_DOUBTFUL_MISSES, _UNLIKE * min(guess, *misses))
 
 
-def explained_by_swap(recording: Recording, first: int, warnings: list[str], is_doubtful: bool = False) -> list[str]:
-    """The warnings, or that of two swapped cameras, by the frames from `first` of sources that still exist.
+def explained_by_swap(
+    recording: Recording, frames: tuple[int, int], warnings: list[str], is_doubtful: bool = False
+) -> list[str]:
+    """The warnings, or that of two swapped cameras, by the first of `frames` (first, stop) of sources that still exist.
 
     It is checked where a warning names a camera, or its misses are doubtful: a check takes seconds.
     """
     named = any(camera.name in warning for camera in recording.rig.cameras for warning in warnings)
     if not named and not is_doubtful:
         return warnings
-    from stseg.tasks.calibration.check import check_rig  # only here: other runs do without its libraries
+    from stseg.tasks.calibration.check import swap_warning, without_empty_scenes  # other runs do without its libraries
 
+    shown, first = [recording, *(without_empty_scenes(recording) if named else [])], frames[0]
     try:
-        found = check_rig(recording, frames=(first, first + _CHECKED_FRAMES))
+        swaps = (swap_warning(one, first, min(frames[1], first + _CHECKED_FRAMES)) for one in shown)
+        return next(([swap] for swap in swaps if swap), warnings)
     except InputError:
         return warnings
-    return [found.verdict[0]] if found.check.swapped else warnings
 
 
 def source_warnings(recording: Recording) -> list[str]:

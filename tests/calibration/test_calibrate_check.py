@@ -183,10 +183,10 @@ class TestCommand:
     def test_a_run_blames_the_exchange_for_what_its_views_look_like(self, rig_file: Path) -> None:
         recording, said = read_recording(rig_file), ["view cam2 denies most people"]
         swapped = replace(recording, rig=exchanged(RIG, 1, 3))
-        assert explained_by_swap(recording, 0, said) == said and explained_by_swap(swapped, 0, []) == []
-        (warning,) = explained_by_swap(swapped, 0, said)
+        assert explained_by_swap(recording, (0, 40), said) == said and explained_by_swap(swapped, (0, 40), []) == []
+        (warning,) = explained_by_swap(swapped, (0, 40), said)
         assert "cam2 and cam4 seem to be swapped" in warning
-        assert explained_by_swap(swapped, 0, [], True) == [warning]
+        assert explained_by_swap(swapped, (0, 40), [], True) == [warning]
         assert recording_warnings(swapped, summarise_sources(swapped)) == [warning]
         for k in range(4):  # people before a wall of each camera's own brightness
             pictures = [np.full((*SIZE[::-1], 3), 40 + 50 * k, np.uint8) for _ in range(50)]
@@ -197,7 +197,7 @@ class TestCommand:
             write_at_rate(Path(f"film{k}.avi"), pictures[10:])
         films, scenes = ([Source("video", Path(f"{name}{k}.avi")) for k in range(4)] for name in ("film", "empty"))
         feeds = tuple(CameraSource(films[k], background=scene) for k, scene in zip((0, 3, 2, 1), scenes, strict=True))
-        (warning,) = explained_by_swap(Recording(rig_file, RIG, feeds), 0, said)
+        (warning,) = explained_by_swap(Recording(rig_file, RIG, feeds), (0, 40), said)
         assert warning.startswith("cam2 and cam4"), "their streams are swapped, and not their empty scenes"
 
 

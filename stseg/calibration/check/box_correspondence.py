@@ -8,8 +8,8 @@ of confirmations. Gates are wide (half a metre), so that a displaced view still 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-from scipy import ndimage
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.bodies.pillars import BodyTable
@@ -193,13 +193,7 @@ def isolated_boxes(evidence: Boxes | Singles | None, size: tuple[int, int]) -> F
         return np.zeros((0, 4))
     if isinstance(evidence, Boxes):
         return np.concatenate([evidence.pixel[:, :2], evidence.pixel[:, :2] + evidence.pixel[:, 2:]], axis=1)
-    labels, count = ndimage.label(evidence > SILHOUETTE_LIKELIHOOD, np.ones((3, 3)))
-    found = []
-    areas = np.bincount(labels.ravel(), minlength=count + 1)[1:]
-    for area, window in zip(areas.tolist(), ndimage.find_objects(labels), strict=True):
-        rows, columns = window
-        box = (columns.start - 0.5, rows.start - 0.5, columns.stop - 0.5, rows.stop - 0.5)
-        whole = (box[2] - box[0]) * (box[3] - box[1])
-        if area > _MIN_AREA * size[0] * size[1] and area > _MIN_FILL * whole:
-            found.append(box)
-    return np.array(found, float).reshape(-1, 4)
+    blobs = cv2.connectedComponentsWithStats((evidence > SILHOUETTE_LIKELIHOOD).view(np.uint8))[2][1:]
+    left, top, width, height, area = blobs.T
+    is_solid = (area > _MIN_AREA * size[0] * size[1]) & (area > _MIN_FILL * width * height)
+    return np.stack([left, top, left + width, top + height], axis=1)[is_solid] - 0.5

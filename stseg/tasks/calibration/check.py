@@ -7,8 +7,9 @@ from html import escape
 from pathlib import Path
 
 from stseg.arrays import Floats, Observation
+from stseg.calibration.check.blunders import find_swapped_streams
 from stseg.calibration.check.box_correspondence import isolated_boxes
-from stseg.calibration.check.rig_check import Check, verdict_text
+from stseg.calibration.check.rig_check import Check, swapped_text, verdict_text
 from stseg.calibration.check.rig_check import check_rig as check_boxes
 from stseg.calibration.check.verdict import Disagreement
 from stseg.config import Config
@@ -148,12 +149,23 @@ def check_rig(rig: Path | str | Recording, *, frames: FrameSpan = None, progress
         raise CalibrationError(recording.path, "camera", "one camera", "two or more, each to be checked by the others")
     check = check_boxes(recording.rig, boxes)
     judged = check.swapped or (check.sound and None not in check.verdict.views)
-    if not judged and any(feed.background for feed in recording.sources):
-        # Empty scenes that were not swapped with their streams spoil the foreground: the streams alone are looked at.
-        bare = replace(recording, sources=tuple(replace(feed, background=None) for feed in recording.sources))
+    for bare in () if judged else without_empty_scenes(recording):
         again = check_boxes(recording.rig, _isolated_boxes(bare, first, stop, progress))
         check = again if again.swapped else check
     return RigCheck(recording, check, tuple(verdict_text(recording.rig, check)), first + len(boxes) // 2)
+
+
+def swap_warning(recording: Recording, first: int, stop: int) -> str:
+    """The sentence on cameras with swapped streams, by the people in some frames; empty if no two are swapped."""
+    boxes = _isolated_boxes(recording, first, stop, None)
+    swapped = find_swapped_streams(recording.rig, boxes) if boxes else ()
+    return swapped_text(recording.rig, swapped) if swapped else ""
+
+
+def without_empty_scenes(recording: Recording) -> list[Recording]:
+    """The streams alone, if there are empty scenes: those not swapped with their streams spoil the foreground."""
+    bare = replace(recording, sources=tuple(replace(feed, background=None) for feed in recording.sources))
+    return [] if bare == recording else [bare]
 
 
 def _isolated_boxes(recording: Recording, first: int, stop: int, progress: AnyReporter) -> dict[int, list[Floats]]:
