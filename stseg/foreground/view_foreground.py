@@ -54,20 +54,9 @@ class ViewForeground:
 
 
 def without_prior(posterior: Singles, prior: float) -> Singles:
-    """The posterior under a prior of one half, which is the likelihood alone.
+    """The likelihood alone of a posterior float32 (v, u) of foreground under a prior, all 0..1, float32 (v, u).
 
     The fusion has a prior of its own, that of a cell being occupied; the pixel's prior would count it twice.
-
-    Parameters
-    ----------
-    posterior : float32 (v, u)
-        Probability of foreground, 0..1.
-    prior
-        The prior in it, 0..1.
-
-    Returns
-    -------
-    float32 (v, u)
     """
     likelihood = np.empty_like(posterior)
     _divide_prior_out(posterior, np.float32(prior), likelihood)

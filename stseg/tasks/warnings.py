@@ -122,9 +122,9 @@ def explained_by_swap(
         return warnings
     from stseg.tasks.calibration.check import swap_warning, without_empty_scenes  # other runs do without its libraries
 
-    shown, first = [recording, *(without_empty_scenes(recording) if named else [])], frames[0]
+    recordings, first = [recording, *(without_empty_scenes(recording) if named else [])], frames[0]
     try:
-        swaps = (swap_warning(one, first, min(frames[1], first + _CHECKED_FRAMES)) for one in shown)
+        swaps = (swap_warning(one, first, min(frames[1], first + _CHECKED_FRAMES)) for one in recordings)
         return next(([swap] for swap in swaps if swap), warnings)
     except InputError:
         return warnings

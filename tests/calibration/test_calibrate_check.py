@@ -187,6 +187,7 @@ class TestCommand:
         (warning,) = explained_by_swap(swapped, (0, 40), said)
         assert "cam2 and cam4 seem to be swapped" in warning
         assert explained_by_swap(swapped, (0, 40), [], True) == [warning]
+        assert explained_by_swap(swapped, (0, 1), said) == said, "frames that the run has not are not looked at"
         assert recording_warnings(swapped, summarise_sources(swapped)) == [warning]
         for k in range(4):  # people before a wall of each camera's own brightness
             pictures = [np.full((*SIZE[::-1], 3), 40 + 50 * k, np.uint8) for _ in range(50)]

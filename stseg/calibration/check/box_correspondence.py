@@ -196,4 +196,4 @@ def isolated_boxes(evidence: Boxes | Singles | None, size: tuple[int, int]) -> F
     blobs = cv2.connectedComponentsWithStats((evidence > SILHOUETTE_LIKELIHOOD).view(np.uint8))[2][1:]
     left, top, width, height, area = blobs.T
     is_solid = (area > _MIN_AREA * size[0] * size[1]) & (area > _MIN_FILL * width * height)
-    return np.stack([left, top, left + width, top + height], axis=1)[is_solid] - 0.5
+    return np.asarray(np.stack([left, top, left + width, top + height], axis=1)[is_solid] - 0.5)
