@@ -24,6 +24,7 @@ from stseg.calibration.points.camera_models import Points
 from stseg.calibration.points.point_fit import fit_points
 from stseg.commands.calibrate.app import app
 from stseg.commands.main import main
+from stseg.config import Config
 from stseg.errors import ConfigError, OutputError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry.sampling import Sampling
@@ -180,7 +181,9 @@ class TestCommand:
         assert (found["off"], found["sound"], [*found["views"]]) == (["cam3"], False, [one.name for one in RIG.cameras])
         refused(ConfigError, r"--frames: found '9'", run, "check", str(rig_file), "--frames=9")
 
-    def test_a_run_blames_the_exchange_for_what_its_views_look_like(self, rig_file: Path) -> None:
+    def test_a_run_blames_the_exchange_for_what_its_views_look_like(
+        self, rig_file: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         recording, said = read_recording(rig_file), ["view cam2 denies most people"]
         swapped = replace(recording, rig=exchanged(RIG, 1, 3))
         assert explained_by_swap(recording, (0, 40), said) == said and explained_by_swap(swapped, (0, 40), []) == []
@@ -198,8 +201,13 @@ class TestCommand:
             write_at_rate(Path(f"film{k}.avi"), pictures[10:])
         films, scenes = ([Source("video", Path(f"{name}{k}.avi")) for k in range(4)] for name in ("film", "empty"))
         feeds = tuple(CameraSource(films[k], background=scene) for k, scene in zip((0, 3, 2, 1), scenes, strict=True))
-        (warning,) = explained_by_swap(Recording(rig_file, RIG, feeds), (0, 40), said)
+        filmed = Recording(rig_file, RIG, feeds)
+        (warning,) = explained_by_swap(filmed, (0, 40), said)
         assert warning.startswith("cam2 and cam4"), "their streams are swapped, and not their empty scenes"
+        few_rows = replace(Config(), foreground=replace(Config().foreground, body_rows=40.0))
+        assert min(filmed.reduced(40.0).factors) > 1
+        monkeypatch.setattr("stseg.tasks.calibration.check.Config", lambda: few_rows)
+        assert explained_by_swap(filmed, (0, 40), said) == [warning], "by reduced pictures, too"
 
 
 @pytest.mark.slow

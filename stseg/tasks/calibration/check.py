@@ -157,8 +157,10 @@ def check_rig(rig: Path | str | Recording, *, frames: FrameSpan = None, progress
 
 def swap_warning(recording: Recording, first: int, stop: int) -> str:
     """The sentence on cameras with swapped streams, by the people in some frames; empty if no two are swapped."""
-    boxes = _isolated_boxes(recording, first, stop, None)
-    swapped = find_swapped_streams(recording.rig, boxes) if boxes else ()
+    coarse = recording.reduced(Config().foreground.body_rows)
+    coarse = replace(coarse, reduction=(min(coarse.factors),) * len(coarse.factors))  # swapped streams have one scale
+    boxes = _isolated_boxes(coarse, first, stop, None)
+    swapped = find_swapped_streams(coarse.reduced_rig, boxes) if boxes else ()
     return swapped_text(recording.rig, swapped) if swapped else ""
 
 
@@ -174,7 +176,7 @@ def _isolated_boxes(recording: Recording, first: int, stop: int, progress: AnyRe
         if next(frame_sets, None) is None:
             return {}
     foregrounds = make_foregrounds(recording, Config(), first, stop)
-    sizes = [camera.size for camera in recording.rig.cameras]
+    sizes = [camera.size for camera in recording.reduced_rig.cameras]
     boxes: dict[int, list[Floats]] = {}
     with (
         open_frames(recording.without_images(), first, None) as frame_sets,
