@@ -86,7 +86,7 @@ def _sheet(log_odds: AnyArray, step: int, limit: float) -> bytes:
     cells = coarse(log_odds, step)[:, ::-1]
     level = np.rint(np.clip(np.nan_to_num(cells) / limit, -1, 1) * _HALF_RANGE) + _HALF_RANGE + 1
     grey: Bytes = np.where(np.isnan(cells), 0, level).astype(np.uint8)
-    _, data = cv2.imencode(".png", grey.reshape(-1, grey.shape[2]), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    _, data = cv2.imencode(".png", grey.reshape(-1, grey.shape[2]), [cv2.IMWRITE_PNG_COMPRESSION, 6])
     return bytes(np.asarray(data, np.uint8))
 
 
