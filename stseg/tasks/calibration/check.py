@@ -171,7 +171,7 @@ def without_empty_scenes(recording: Recording) -> list[Recording]:
 
 
 def _isolated_boxes(recording: Recording, first: int, stop: int, progress: AnyReporter) -> dict[int, list[Floats]]:
-    """Boxes (n, 4) of people who stand alone in each view, by frame; none where the recording has no such frames."""
+    """Boxes (n, 4) of people alone in each view by frame, pixels of the pictures as read; empty where no frame is."""
     with open_frames(recording.without_images(), first) as frame_sets:
         if next(frame_sets, None) is None:
             return {}
