@@ -73,7 +73,7 @@ def gather_provenance(recording: Recording, config_text: str) -> Provenance:
         mask_passwords(format_rig(recording, recording.path)),
         path,
         _versions(),
-        _sources(recording),
+        np.array([(name, role.encode(), *_described(source)) for name, role, source in _streams(recording)], SOURCE),
         {
             camera.name: source.frame_at_tick
             for camera, source in zip(recording.rig.cameras, recording.sources, strict=True)
@@ -188,11 +188,6 @@ def _versions() -> dict[str, str]:
         except PackageNotFoundError:  # another build of the same library, such as opencv-python
             found[package] = "unknown"
     return found
-
-
-def _sources(recording: Recording) -> Rows:
-    rows = [(name, role.encode(), *_described(source)) for name, role, source in _streams(recording)]
-    return np.array(rows, SOURCE)
 
 
 def _streams(recording: Recording) -> Iterator[tuple[str, str, Source]]:

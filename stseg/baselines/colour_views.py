@@ -55,9 +55,6 @@ def _is_colour(observation: Observation) -> bool:
 
 
 def _kinds(observations: Sequence[Observation]) -> str:
-    kinds = {"boxes" if isinstance(one, Boxes) else _dtype_kind(one) for one in observations}
+    rasters = [None if isinstance(one, Boxes) else np.asarray(one).dtype for one in observations]
+    kinds = {"boxes" if dtype is None else "instances" if dtype == np.uint16 else "masks" for dtype in rasters}
     return " and ".join(sorted(kinds))
-
-
-def _dtype_kind(one: Observation) -> str:
-    return "instances" if isinstance(one, np.ndarray) and one.dtype == np.uint16 else "masks"

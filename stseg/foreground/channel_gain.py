@@ -6,6 +6,7 @@ this holds even where people cover more than half of the view.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stseg.arrays import Bytes, Floats, Ints, Singles
 from stseg.kernels.accelerate import kernel
@@ -41,6 +42,19 @@ def channel_gains(image: Bytes, background: Singles) -> Floats:
     _count_ratios(image, background, _LOG, counts)
     fill_gains(counts, max(_LEAST_SHARE * image.shape[0] * image.shape[1], _LEAST_SAMPLES), gains)
     return gains
+
+
+def to_common_light(frames: NDArray[np.uint8]) -> None:
+    """Divide frames, uint8 (n, v, u, 3) BGR, in place by their gains over the temporal median of each pixel.
+
+    The median of a light is the same for all pixels that show background in most frames: people do not spoil it.
+    """
+    samples = frames[:, ::STRIDE, ::STRIDE]
+    median = np.median(samples, 0).astype(np.float32)
+    for frame, sample in zip(frames, samples, strict=True):
+        for channel, gain in enumerate(channel_gains(np.ascontiguousarray(sample), median)):
+            levels = np.rint(np.arange(256) / gain).clip(0, 255).astype(np.uint8)
+            frame[..., channel] = levels.take(frame[..., channel], mode="clip")
 
 
 @kernel

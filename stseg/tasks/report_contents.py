@@ -44,7 +44,8 @@ def page_contents(
         Whether the instants hold camera images.
     """
     rig, trajectory = run.recording.rig, run.trajectory
-    span, ghosts, bins = _span(run), ghost_reasons(run.ghosts), Bins.of(rig.grid)
+    first, stop = (int(run.frames[0]), int(run.frames[-1]) + 1) if len(run.frames) else (0, 1)
+    span, ghosts, bins = Span(first, stop, run.frame_rate), ghost_reasons(run.ghosts), Bins.of(rig.grid)
     places, shares = dwell_places(trajectory, bins), ground_by_views(run.views, rig.grid.inside(), len(run.cameras))
     frames_shown = np.array([instant.frame for instant in instants], np.int64)
     sheets = thin_sheets(run.frames, rig.grid, run.read_frame, _SHEETS, frames_shown)
@@ -91,11 +92,6 @@ def _cell_probability(run: Run) -> list[tuple[float, float]]:
         return []
     probability = run.cell_reliability.of_cells(np.array(_LOG_ODDS, np.float32))
     return list(zip(_LOG_ODDS, probability.tolist(), strict=True))
-
-
-def _span(run: Run) -> Span:
-    first, stop = (int(run.frames[0]), int(run.frames[-1]) + 1) if len(run.frames) else (0, 1)
-    return Span(first, stop, run.frame_rate)
 
 
 def _facts(run: Run, span: Span) -> list[tuple[str, str]]:

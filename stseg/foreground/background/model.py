@@ -19,7 +19,7 @@ from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import BackgroundConfig
 from stseg.errors import ConfigError, SourceError
 from stseg.foreground.background.posterior import Priors, pool_log_odds
-from stseg.foreground.channel_gain import STRIDE, channel_gains
+from stseg.foreground.channel_gain import STRIDE, channel_gains, to_common_light
 
 TURNS = 4
 """Each frame updates every fourth row at four times the rate: rates are slow, and it costs a quarter."""
@@ -73,7 +73,7 @@ class Background(ABC):
         self._frames_learned += 1
 
     def learn_from(self, images: Iterable[Bytes]) -> None:
-        """Start anew from frames in which people walk: the temporal mode of each pixel's colour.
+        """Start anew from frames in which people walk: the temporal mode of each pixel's colour, in one light.
 
         Parameters
         ----------
@@ -91,7 +91,9 @@ class Background(ABC):
             raise SourceError(self.name, "", "no frames", "one or more to learn from")
         for frame in frames:
             self._check(frame)
-        self._start(np.stack(frames))
+        stacked = np.stack(frames)
+        to_common_light(stacked)
+        self._start(stacked)
         self._frames_learned = len(frames)
 
     def likelihood(self, image: Bytes) -> Singles:

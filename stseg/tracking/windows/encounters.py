@@ -26,16 +26,12 @@ def touches(first: int, blobs: Sequence[Blobs], identity: Sequence[Ints]) -> lis
     events: list[tuple[int, str, int, int, str]] = []
     before: set[tuple[int, int]] = set()
     for frame, (found, names) in enumerate(zip(blobs, identity, strict=True), first):
-        now = _pairs(found, names)
+        pairs = np.sort(names[found.touches], axis=1).reshape(-1, 2).tolist()
+        now = {(a, b) for a, b in pairs if 0 < a < b}
         events += [(frame, "merge", a, b, "") for a, b in now - before]
         events += [(frame - 1, "split", a, b, "") for a, b in before - now]
         before = now
     return events + [(first + len(blobs) - 1, "split", a, b, "") for a, b in before]
-
-
-def _pairs(found: Blobs, names: Ints) -> set[tuple[int, int]]:
-    named = np.sort(names[found.touches], axis=1).reshape(-1, 2).tolist()
-    return {(a, b) for a, b in named if 0 < a < b}
 
 
 def encounters(contacts: Rows, name: Callable[[int, int], int], parting: int, frame_rate: float, last: int) -> Rows:
