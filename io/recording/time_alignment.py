@@ -241,13 +241,8 @@ def _trusted_stamps(camera: _CameraTimes, others: Sequence[_CameraTimes], rate: 
 def _same_count(camera: _CameraTimes, stamps: TimeStamps, references: Sequence[_CameraTimes]) -> bool:
     """Whether a camera has as many frames as a reference at the rig's rate, but by its stamps another end."""
     count, by_time = camera.frames, stamps.position[-1] + stamps.period
-    ends = [_end(other) for other in references]
+    ends = [one.stamps.position[-1] + one.stamps.period if one.stamps else one.frames for one in references]
     return any(abs(count - end) <= _COUNT_TOLERANCE * end and abs(count - end) < abs(by_time - end) for end in ends)
-
-
-def _end(camera: _CameraTimes) -> float:
-    """End of a camera's frames by its stamps, ticks."""
-    return float(camera.stamps.position[-1] + camera.stamps.period) if camera.stamps else float(camera.frames)
 
 
 def _with_common_end(

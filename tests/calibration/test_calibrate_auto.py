@@ -11,7 +11,7 @@ from films import write_at_rate
 from hypothesis import strategies as st
 from simulated_people import Walking, changed, delayed, walking
 
-from stseg import Camera, Grid, read_recording
+from stseg import Camera, Grid, read_recording, simulate
 from stseg.arrays import Bytes, Floats, Singles
 from stseg.calibration.adjusted_rig import cameras_of, centred, grid_of, offsets_of, reports_of, scaled
 from stseg.calibration.automatic import auto
@@ -32,11 +32,12 @@ from stseg.calibration.automatic.view_alignment import ViewPlaces, align, mirror
 from stseg.calibration.bundle_adjustment import adjust, residuals
 from stseg.calibration.pinhole import CENTRE, ENDS, SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto
+from stseg.engine.reporter import reporter_of
 from stseg.errors import ConfigError, SourceError
 from stseg.simulation import SceneSpec
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
 from stseg.simulation.rendering.room import render_room
-from stseg.tasks.calibration.automatic import _require_plausible, frame_rate_notes
+from stseg.tasks.calibration.automatic import _require_plausible, frame_rate_notes, people_of
 
 IMAGE = (480, 360)
 
@@ -131,6 +132,8 @@ def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> N
     assert best.delay == delay and best.support > 0.9 * len(a.frame)
     assert abs(best.factor - np.exp(1j * turn)) < 0.02 and abs(best.shift - (2 - 1j)) < 0.05
     assert align(a, mirrored(b), 5.0, 10)[0].support < 0.6 * best.support
+    still = ViewPlaces(a.frame, np.where(np.arange(len(a.frame)) < 3, a.place, 1.0 + 0j))
+    assert all(np.isfinite(one.factor) for one in align(still, still, 5.0, 10))
 
 
 DELAYS = [0, 4, -3]
@@ -269,6 +272,17 @@ def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: Captured) -> 
     ground = recording.rig.cameras[0].back_project(np.array([[150.0, 250.0], [300.0, 260.0]]))
     assert np.linalg.norm(ground[1] - ground[0]) == pytest.approx(3.0, abs=0.01)
     assert "distance in a: 3.000 m instead of 3 (+0.0 %)" in capsys.readouterr().out
+
+
+def test_deep_shadows_move_no_feet(tmp_path: Path) -> None:
+    simulate(tmp_path, scene="easy", people=1, cameras=2, seconds=6.0, frame_rate=5.0, size=(240, 180), shadows=0.65)
+    recording = read_recording(tmp_path / "rig.toml")
+    truth = np.genfromtxt(tmp_path / "truth.csv", delimiter=",", names=True)
+    views, _ = people_of(recording, None, 1.7, 0.0, reporter_of(None))
+    for camera, found in zip(recording.rig.cameras, views.endpoints, strict=True):
+        row = truth["frame"].searchsorted(found.frame)
+        pixel, _ = camera.project(np.column_stack([truth["x"][row], truth["y"][row]]), 0.0)
+        assert len(row) > 20 and np.median(np.hypot(*(pixel - found.foot).T)) < 4.0
 
 
 @cases()

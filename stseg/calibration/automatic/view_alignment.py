@@ -126,7 +126,8 @@ def _refined(a: ViewPlaces, b: ViewPlaces, one: Alignment) -> Alignment:
     best = Alignment(one.delay, factor, shift, _agreement(a, b, rows, factor, shift)[0])
     for _ in range(_ROUNDS):
         _, weight = _agreement(a, b, rows, factor, shift)
-        if (weight > 0).sum() < 4 or np.ptp(a.frame[rows[0][weight > 0]]) < 2:
+        used = rows[0][weight > 0]
+        if len(used) < 4 or np.ptp(a.frame[used]) < 2 or len(np.unique(a.place[used])) < 2:
             break
         x, y = a.place[rows[0]], b.place[rows[1]]
         mean_x, mean_y = (np.sum(weight * z) / weight.sum() for z in (x, y))

@@ -13,7 +13,7 @@ from stseg.calibration.automatic.auto import calibrate_from_people, sharpen_by_f
 from stseg.calibration.automatic.endpoints import Endpoints, concatenate_endpoints, upright_endpoints
 from stseg.calibration.automatic.scale import KnownDistance, adjusted_to, measured, scale_spread, scaled_to
 from stseg.calibration.automatic.solution import CalibrationInput, SolvedViews
-from stseg.config import Config
+from stseg.config import Config, ForegroundConfig, MixtureConfig
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.offline.frame_range import FrameRange, FrameSpan
 from stseg.engine.reporter import AnyReporter, Reporter, reporter_of
@@ -37,6 +37,8 @@ _DEFAULT_FRAMES = 3000
 """Frames that are read by default, at most."""
 _HEIGHTS = (0.2, 2.6)
 """Mean heights of people, or animals, that known distances may lead to, metres."""
+_DARKEST_SHADOW = 0.3
+"""Brightness of the deepest shadow: one that lies at the feet moves them, while clothes as dark are missed in parts."""
 _DELAYS = (0.0, 3600.0)
 """Greatest delays that can be looked for, seconds."""
 _RATE_MARGIN = 0.1
@@ -174,7 +176,8 @@ def people_of(
     for note in counted.notes:
         reporter.note(note)
     first, stop = _frame_range(frames, counted.length)
-    foregrounds = make_foregrounds(streams, Config(), first, stop, streams=counted)
+    config = Config(foreground=ForegroundConfig(mixture=MixtureConfig(darkest_shadow=_DARKEST_SHADOW)))
+    foregrounds = make_foregrounds(streams, config, first, stop, streams=counted)
     endpoints = _endpoints(streams, counted, foregrounds, range(first, stop), reporter)
     sizes = tuple(camera.size for camera in streams.rig.cameras)
     views = CalibrationInput(endpoints, sizes, streams.rig.frame_rate, person_height, most_delay)
