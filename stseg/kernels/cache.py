@@ -121,7 +121,8 @@ def _lock(opened: int) -> None:
 @cache
 def folder() -> Path:
     """The folder of all kernels: the first that is this user's and can be written to; else a temporary one."""
-    for place in (_folder_of_environment(), _folder_of_user()):
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    for place in (Path(named) / "stseg" if named else None, _folder_of_user()):
         if place is not None and _is_usable(place):
             return place
     temporary = Path(tempfile.mkdtemp(prefix="stseg-kernels-"))
@@ -157,11 +158,6 @@ def _imported_files(path: Path) -> list[Path]:
         module = _PACKAGE.joinpath(*(names[0] or names[1]).decode().split(".")[1:])
         files += [file for file in (module.with_suffix(".py"), module / "__init__.py") if file.is_file()]
     return files
-
-
-def _folder_of_environment() -> Path | None:
-    folder = os.environ.get("NUMBA_CACHE_DIR")
-    return Path(folder) / "stseg" if folder else None
 
 
 def _folder_of_user() -> Path | None:

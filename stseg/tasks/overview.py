@@ -62,6 +62,7 @@ def summarise_run(run: Run) -> Overview:
     ghosts, reasons = run.ghosts["status"] == 0, ghost_reasons(run.ghosts)
     solved = run.windows["solve_stop"] - run.windows["solve_first"]
     kinds, counts = np.unique(run.events["kind"], return_counts=True)
+    rows = run.tracks[np.lexsort((run.tracks["id"], -run.tracks["frames"]))]
     last_rates = run.rates[run.rates["frame"] == run.rates["frame"].max(initial=-1)]
     return Overview(
         file=str(run.path),
@@ -82,7 +83,7 @@ def summarise_run(run: Run) -> Overview:
         people_mean=per(people.sum(), count),
         people_most=int(people.max(initial=0)),
         people_per_minute=people_per_minute(run.frames, run.trajectory, run.frame_rate).tolist(),
-        tracks=_tracks(run),
+        tracks=[dict(zip(rows.dtype.names or (), row.tolist(), strict=True)) for row in rows],
         track_seconds=_track_seconds(run),
         filled_points=per(np.isnan(run.trajectory["raw_x"]).sum(), len(run.trajectory)),
         events={name.decode(): int(number) for name, number in zip(kinds.tolist(), counts, strict=True)},
@@ -110,11 +111,6 @@ def seconds_by_stage(run: Run) -> dict[str, float]:
     names, stage = np.unique(run.timings["stage"], return_inverse=True)
     seconds = np.bincount(stage, run.timings["seconds"], len(names))
     return {names[index].decode(): float(seconds[index]) for index in np.argsort(-seconds, kind="stable")}
-
-
-def _tracks(run: Run) -> list[dict[str, float]]:
-    rows = run.tracks[np.lexsort((run.tracks["id"], -run.tracks["frames"]))]
-    return [dict(zip(rows.dtype.names or (), row.tolist(), strict=True)) for row in rows]
 
 
 def _track_seconds(run: Run) -> dict[str, float]:

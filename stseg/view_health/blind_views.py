@@ -54,17 +54,12 @@ class ExcludedViews:
             excluded = observations[k] is not None and (evidence[k] is None or failures.excluded[k])
             if excluded and since is None:
                 self.since[k] = frame
-                reasons.append(f"camera {name} {_reason(evidence[k], bool(failures.knocks.knocked[k]))}")
+                why = _NO_EVIDENCE if evidence[k] is None else _KNOCKED if failures.knocks.knocked[k] else _FAILS
+                reasons.append(f"camera {name} {why}")
             elif since is not None and not excluded and observations[k] is not None:
                 self.since[k] = None
                 reasons.append(f"camera {name} counts again, after {frame - since} frames")
         return np.array([(frame, b"blind", 0, 0, reason_of(reason)) for reason in reasons], EVENT)
-
-
-def _reason(evidence: ViewEvidence, knocked: bool) -> str:
-    if evidence is None:
-        return _NO_EVIDENCE
-    return _KNOCKED if knocked else _FAILS
 
 
 _FROZEN_TIME, _FROZEN_FRAMES = 0.5, 3

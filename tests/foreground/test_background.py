@@ -167,6 +167,21 @@ def test_drifting_light_does_not_spoil_the_start(kind: type[Background]) -> None
 
 
 @every_model
+@pytest.mark.parametrize(("colour", "least", "most"), [((120.0, 120.0, 120.0), 0.2, 0.5), (FLOOR, 0.0, 0.12)])
+def test_dark_clothes_show_where_a_camera_knows_greys(
+    kind: type[Background], colour: tuple[float, float, float], least: float, most: float
+) -> None:
+    learned, started = new(kind), new(kind)
+    for _ in range(20):
+        learned.learn(room(colour))
+    started.learn_from([room(colour)] * 20)
+    for model in (learned, started):
+        darker = with_person(room(colour), (0.75 * colour[0], 0.75 * colour[1], 0.75 * colour[2]))
+        likelihood = model.likelihood(darker)
+        assert least <= likelihood[MIDDLE] <= most and likelihood[0, 0] < 0.02
+
+
+@every_model
 @pytest.mark.parametrize("level", [0, 255])
 def test_black_and_white_scenes_are_scenes_too(kind: type[Background], level: int) -> None:
     scenes = [room((level, level, level)) for _ in range(20)]

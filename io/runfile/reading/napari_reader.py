@@ -7,7 +7,6 @@ from typing import Any
 import h5py
 import numpy as np
 
-from stseg.arrays import Floats
 from stseg.io.runfile import layout
 from stseg.io.runfile.reading.hdf5_reading import read_attribute
 from stseg.io.runfile.reading.run_reader import Run, read_run
@@ -75,20 +74,15 @@ def _axes() -> dict[str, Any]:
 
 
 def _scale(run: Run) -> tuple[float, ...]:
-    """Seconds a frame and metres a cell."""
-    steps = (_step(axis) for axis in (run.frames / run.frame_rate, run.heights, run.ground_y, run.ground_x))
-    return tuple(steps)
+    """Seconds a frame and metres a cell: mean distances of neighbours, 1 where there are none."""
+    axes = (run.frames / run.frame_rate, run.heights, run.ground_y, run.ground_x)
+    return tuple(float(axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in axes)
 
 
 def _first_cell(run: Run) -> tuple[float, ...]:
     """Centre of the first cell of the first frame, seconds and metres."""
     axes = (run.frames / run.frame_rate, run.heights, run.ground_y, run.ground_x)
     return tuple(float(axis[0]) if len(axis) else 0.0 for axis in axes)
-
-
-def _step(axis: Floats) -> float:
-    """Mean distance of neighbours; 1 where there are none."""
-    return float(axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0
 
 
 def _contrast(run: Run) -> tuple[float, float]:

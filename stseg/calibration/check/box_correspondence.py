@@ -141,8 +141,10 @@ def candidates(camera: Camera, grid: Grid, boxes: Floats) -> tuple[Floats, Float
     ground = np.concatenate([foot, by_head])
     height = np.where(whole, height_of(camera, foot, middle, boxes[:, 1]), np.nan)
     height = np.concatenate([height, np.full(len(boxes), BODY_HEIGHT)])
+    low, high = np.transpose([grid.x, grid.y])
     with np.errstate(invalid="ignore"):
-        kept = (height > _MIN_HEIGHT) & (height < _MAX_HEIGHT) & _in_area(ground, grid)
+        in_area = ((ground > low - _MARGIN) & (ground < high + _MARGIN)).all(axis=1)
+        kept = (height > _MIN_HEIGHT) & (height < _MAX_HEIGHT) & in_area
     return ground[kept], height[kept], np.flatnonzero(kept) % max(len(boxes), 1)
 
 
@@ -154,11 +156,6 @@ def height_of(camera: Camera, ground: Floats, u: Floats, top: Floats) -> Floats:
         return np.asarray(
             (foot[:, 1] - ideal[:, 1] * foot[:, 2]) / (ideal[:, 1] * camera.vertical[2] - camera.vertical[1])
         )
-
-
-def _in_area(ground: Floats, grid: Grid) -> Flags:
-    low, high = np.transpose([grid.x, grid.y])
-    return np.asarray(((ground > low - _MARGIN) & (ground < high + _MARGIN)).all(axis=1))
 
 
 def _greedy_selection(residual: Floats, which: Ints) -> list[tuple[int, Ints]]:

@@ -50,7 +50,7 @@ class Codebook(Background):
 
     def __init__(self, size: tuple[int, int], frame_rate: float, config: CodebookConfig | None = None) -> None:
         self.config = config = CodebookConfig() if config is None else config
-        super().__init__(size, frame_rate, config)
+        super().__init__(size, frame_rate, config, config.channel_sd)
         self._words = Codewords.none((size[1], size[0], config.codewords))
         self._tube = Tube(config.highlight_prior, config.brightest_highlight, config.channel_sd)
         self._reach = config.match_distance * config.channel_sd

@@ -96,6 +96,7 @@ def fill_codebook_log_odds(
                     _ONE,
                     doubt,
                     mimics / (_ONE + half * over * over),  # exp(-z) <= 1 / (1 + z)
+                    np.float32(priors.uniform),
                 ):
                     certain = True
                     break

@@ -16,7 +16,6 @@ from stseg.arrays import Bytes, Labels, Singles
 from stseg.foreground.background.posterior import (
     EXPONENT_LIMIT,
     LOG_ODDS_LIMIT,
-    UNIFORM_DENSITY,
     Priors,
     bounded_log_odds,
     doubt_of,
@@ -29,7 +28,7 @@ MEAN, VARIANCE = 0, 3
 _WHITE, _ZERO, _ONE, _TWO, _HALF = (np.float32(value) for value in (255, 0, 1, 2, 0.5))
 _TINY, _SIXTEENTH, _TWO_PI = np.float32(1e-6), np.float32(1 / 16), np.float32(2 * math.pi)
 _SHORTEST = np.float32(1 / math.sqrt(3))  # no colour is shorter than this share of the sum of its channels
-_UNIFORM, _EXPONENT_LIMIT = np.float32(UNIFORM_DENSITY), np.float32(EXPONENT_LIMIT)
+_EXPONENT_LIMIT = np.float32(EXPONENT_LIMIT)
 _THIRD, _NEVER = np.float32(1 / 3), np.float32(np.inf)
 
 
@@ -96,7 +95,7 @@ def _fill_margin(
     lengthwise, weights = mode[planes - 2, v], mode[planes - 1, v]
     g0, g1, g2 = gain[0], gain[1], gain[2]
     sure, reach = np.float32(1.0 - background_weight), np.float32(1.0 - priors.darkest_shadow)
-    confusion = np.float32(priors.shadow_confusion)
+    confusion, uniform = np.float32(priors.shadow_confusion), np.float32(priors.uniform)
     doubt = np.float32(doubt_of(priors))
     for u in range(colour.shape[1]):
         m0, m1, m2 = g0 * blue[u], g1 * green[u], g2 * red[u]
@@ -118,7 +117,7 @@ def _fill_margin(
         closeness, level = closeness * closeness, level * level
         closeness, level = closeness * closeness, level * level
         closeness, level = closeness * closeness, level * level
-        person = _UNIFORM * area * line * level + _TWO * confusion * weight * closeness
+        person = uniform * area * line * level + _TWO * confusion * weight * closeness
         excess = weight * closeness * level * line - doubt * span * person
         margin[u] = excess if weight > sure else _ZERO
 

@@ -63,9 +63,9 @@ class Mixture(Background):
 
     def __init__(self, size: tuple[int, int], frame_rate: float, config: MixtureConfig | None = None) -> None:
         self.config = config = self._default if config is None else config
-        super().__init__(size, frame_rate, config)
         least = config.chromatic_sd if isinstance(config, ChromaticConfig) else config.minimum_sd, config.minimum_sd
         numbers = config.background_weight, config.match_distance, config.initial_sd, *least
+        super().__init__(size, frame_rate, config, least[0])
         self._constants = tuple(np.float32(number) for number in numbers)
         self.modes = np.zeros((config.modes, VARIANCE + self.variances + 1, size[1], size[0]), np.float32)
         self.modes[:, VARIANCE:-1] = config.initial_sd**2

@@ -23,6 +23,8 @@ from stseg.foreground.channel_gain import STRIDE, channel_gains, to_common_light
 
 TURNS = 4
 """Each frame updates every fourth row at four times the rate: rates are slow, and it costs a quarter."""
+_GREY = 2.0
+"""Mean difference of a pixel's channels below which a camera shows no colours, grey levels."""
 
 
 class Background(ABC):
@@ -36,6 +38,8 @@ class Background(ABC):
         Frames per second at which `likelihood` is called.
     config
         Assumptions about scene and camera.
+    spread
+        Least standard deviation of a background colour across its ray, grey levels.
 
     Notes
     -----
@@ -45,12 +49,12 @@ class Background(ABC):
     name: ClassVar[str]
     """The model's name in messages."""
 
-    def __init__(self, size: tuple[int, int], frame_rate: float, config: BackgroundConfig) -> None:
+    def __init__(self, size: tuple[int, int], frame_rate: float, config: BackgroundConfig, spread: float = 4.0) -> None:
         if not frame_rate > 0:
             raise ConfigError(self.name, "frame_rate", frame_rate, "frames per second, above 0")
         self._shape = (size[1], size[0], 3)
         self._turn = TURNS / frame_rate
-        self._config, self._priors = config, Priors.of(config)
+        self._config, self._spread, self._priors = config, spread, Priors.of(config)
         self._frames_learned = 0
         self._frames_evaluated = 0
 
@@ -69,6 +73,7 @@ class Background(ABC):
         """Learn a frame of the empty scene, uint8 (v, u, 3) BGR; all such frames have equal weight."""
         self._check(image)
         image = np.ascontiguousarray(image)
+        self._learn_colours(image)
         self._learn_empty(image, self._gain(image))
         self._frames_learned += 1
 
@@ -92,6 +97,7 @@ class Background(ABC):
         for frame in frames:
             self._check(frame)
         stacked = np.stack(frames)
+        self._learn_colours(stacked)
         to_common_light(stacked)
         self._start(stacked)
         self._frames_learned = len(frames)
@@ -153,6 +159,15 @@ class Background(ABC):
     @abstractmethod
     def _update_rows(self, first: int, image: Bytes, gain: Floats, likelihood: Singles) -> None:
         """Learn every `TURNS`-th row from `first` on of a frame that may show people with `likelihood` (v, u)."""
+
+    def _learn_colours(self, images: NDArray[np.uint8]) -> None:
+        """Whether the camera shows colours, by images (..., v, u, 3); greys have a line of their own in place of them.
+
+        Without it whatever is darker than the ground would look like a shadow.
+        """
+        is_grey = np.ptp(images[..., ::STRIDE, ::STRIDE, :], axis=-1).mean() < _GREY
+        priors = Priors.of(self._config)
+        self._priors = priors.of_greys(self._spread) if is_grey else priors
 
     def _gain(self, image: Bytes) -> Floats:
         """The frame's channel gains relative to the model."""

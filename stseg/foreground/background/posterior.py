@@ -20,7 +20,7 @@ LOG_ODDS_LIMIT = 5.0  # nats; beyond it one pixel would outvote all its neighbou
 EXPONENT_LIMIT = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
 _CERTAIN_RATIO = math.exp(LOG_ODDS_LIMIT)
 _ROUNDING = 1.001  # more than single precision loses
-_UNIFORM = np.float32(UNIFORM_DENSITY)
+_GREY_DENSITY = 1.0 / (256.0 * math.sqrt(3.0))  # of an unknown grey along the axis of grey, per grey level
 _ZERO, _ONE, _TWO, _SIXTEENTH = np.float32(0), np.float32(1), np.float32(2), np.float32(1 / 16)
 
 
@@ -32,19 +32,26 @@ class Priors(NamedTuple):
     shadow_prior: float
     darkest_shadow: float
     shadow_confusion: float
+    uniform: float
+    """U: density of a colour of which nothing is known, per cubed grey level."""
 
     @classmethod
     def of(cls, config: BackgroundConfig) -> Self:
-        """Those of a configuration."""
-        return cls(*(float(getattr(config, name)) for name in cls._fields))
+        """Those of a configuration, for colours."""
+        given = {name: float(getattr(config, name)) for name in cls._fields[:-1]}
+        return cls(**given, uniform=UNIFORM_DENSITY)
+
+    def of_greys(self, spread: float) -> Self:
+        """The same for a camera without colours: greys, with a standard deviation across their axis, grey levels."""
+        return self._replace(uniform=_GREY_DENSITY / (2.0 * math.pi * spread**2))
 
 
 @kernel
 def bounded_log_odds(lit: float, dimmed: float, priors: Priors) -> float:
     """The log-odds of a person, nats, within 5."""
-    foreground, unexplained, shadow, _, mimicry = priors
-    person = (1.0 - mimicry) * UNIFORM_DENSITY + mimicry * dimmed
-    scene = (1.0 - unexplained) * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * UNIFORM_DENSITY
+    foreground, unexplained, shadow, _, mimicry, uniform = priors
+    person = (1.0 - mimicry) * uniform + mimicry * dimmed
+    scene = (1.0 - unexplained) * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * uniform
     ratio = foreground * person / ((1.0 - foreground) * scene)
     if ratio >= _CERTAIN_RATIO:
         return LOG_ODDS_LIMIT
@@ -54,7 +61,7 @@ def bounded_log_odds(lit: float, dimmed: float, priors: Priors) -> float:
 @kernel
 def doubt_of(priors: Priors) -> float:
     """Ratio of the densities of background and people from which on the log-odds are at their lower bound."""
-    foreground, unexplained, shadow, _, _ = priors
+    foreground, unexplained, shadow, _, _, _ = priors
     lit_share = (1.0 - unexplained) * (1.0 - shadow)
     return _ROUNDING * foreground * math.exp(LOG_ODDS_LIMIT) / ((1.0 - foreground) * lit_share)
 
@@ -69,6 +76,7 @@ def outshines(
     weight: np.float32,
     doubt: np.float32,
     mimicry: np.float32,
+    uniform: np.float32,
 ) -> bool:
     """Whether a single background mode exceeds the density of people `doubt` times (a sufficient condition).
 
@@ -85,7 +93,7 @@ def outshines(
     closeness, level = closeness * closeness, level * level
     closeness, level = closeness * closeness, level * level
     closeness, level = closeness * closeness, level * level
-    person = _UNIFORM * area * line * level + _TWO * mimicry * weight * closeness
+    person = uniform * area * line * level + _TWO * mimicry * weight * closeness
     return bool(doubt * span * person < weight * closeness * level * line)
 
 
