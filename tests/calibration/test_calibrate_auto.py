@@ -132,6 +132,8 @@ def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> N
     assert best.delay == delay and best.support > 0.9 * len(a.frame)
     assert abs(best.factor - np.exp(1j * turn)) < 0.02 and abs(best.shift - (2 - 1j)) < 0.05
     assert align(a, mirrored(b), 5.0, 10)[0].support < 0.6 * best.support
+    beyond = ViewPlaces(a.frame, np.where(np.arange(len(a.frame)) == 5, complex(np.nan, np.nan), a.place))
+    assert abs(align(beyond, b, 5.0, 10)[0].factor - best.factor) < 0.005
     still = ViewPlaces(a.frame, np.where(np.arange(len(a.frame)) < 3, a.place, 1.0 + 0j))
     assert all(np.isfinite(one.factor) for one in align(still, still, 5.0, 10))
 

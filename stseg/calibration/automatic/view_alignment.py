@@ -126,10 +126,10 @@ def _refined(a: ViewPlaces, b: ViewPlaces, one: Alignment) -> Alignment:
     best = Alignment(one.delay, factor, shift, _agreement(a, b, rows, factor, shift)[0])
     for _ in range(_ROUNDS):
         _, weight = _agreement(a, b, rows, factor, shift)
-        used = rows[0][weight > 0]
-        if len(used) < 4 or np.ptp(a.frame[used]) < 2 or len(np.unique(a.place[used])) < 2:
+        of_a, of_b, weight = rows[0][weight > 0], rows[1][weight > 0], weight[weight > 0]  # beyond the horizon is none
+        x, y = a.place[of_a], b.place[of_b]
+        if len(x) < 4 or np.ptp(a.frame[of_a]) < 2 or len(np.unique(x)) < 2:
             break
-        x, y = a.place[rows[0]], b.place[rows[1]]
         mean_x, mean_y = (np.sum(weight * z) / weight.sum() for z in (x, y))
         factor = np.sum(weight * np.conj(x - mean_x) * (y - mean_y)) / np.sum(weight * np.abs(x - mean_x) ** 2)
         # Two views of people of one height have one scale, up to what a single view knows of its lens.
