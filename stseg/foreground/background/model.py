@@ -161,9 +161,9 @@ class Background(ABC):
         """Learn every `TURNS`-th row from `first` on of a frame that may show people with `likelihood` (v, u)."""
 
     def _learn_colours(self, images: NDArray[np.uint8]) -> None:
-        """Whether the camera shows colours, by images (..., v, u, 3); greys have a line of their own in place of them.
+        """Learn whether the camera shows colours, from images (..., v, u, 3).
 
-        Without it whatever is darker than the ground would look like a shadow.
+        Where it shows greys alone, people's clothes are greys, too. So these are as near to each other as shadows are.
         """
         is_grey = np.ptp(images[..., ::STRIDE, ::STRIDE, :], axis=-1).mean() < _GREY
         priors = Priors.of(self._config)
