@@ -163,7 +163,7 @@ class Background(ABC):
     def _learn_colours(self, images: NDArray[np.uint8]) -> None:
         """Learn whether the camera shows colours, from images (..., v, u, 3).
 
-        Where it shows greys alone, people's clothes are greys, too. So these are as near to each other as shadows are.
+        Where it shows greys alone, an unknown colour lies on the line of greys, as a shadow does: U is denser there.
         """
         is_grey = np.ptp(images[..., ::STRIDE, ::STRIDE, :], axis=-1).mean() < _GREY
         priors = Priors.of(self._config)

@@ -1,7 +1,7 @@
 """Foreground log-odds of a colour from its densities, and their pooling over neighbours: common to all models.
 
 With densities per cubed grey level, `lit` of the background as it was learned, `dimmed` of it in shadow, and U of a
-colour of which nothing is known (symbols as in `stseg.foreground.background.mixture`),
+colour of which nothing is known, in the cube of colours or on the line of greys (symbols as in the module `mixture`),
 
     log-odds = log f ((1 - m) U + m dimmed) / ((1 - f) ((1 - e) ((1 - s) lit + s dimmed) + e U)),   within 5 nats.
 """
