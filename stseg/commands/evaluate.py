@@ -138,7 +138,7 @@ def _table(scores: Scores) -> Table:
     placed = {"mean": scores.location_mean, "median": scores.location_median, "MOTP": scores.motp}
     table.add_row("found", *(f"{name} {_percent(value)}" for name, value in found.items()))
     table.add_row("followed", *(f"{name} {_percent(value)}" for name, value in followed.items()))
-    table.add_row("placed", *(f"{name} {_metres(value)}" for name, value in placed.items()))
+    table.add_row("placed", *(f"{key} -" if value is None else f"{key} {value:.3f} m" for key, value in placed.items()))
     table.add_row(
         f"people {scores.people}",
         f"MT {scores.mostly_tracked}",
@@ -161,7 +161,3 @@ def _table(scores: Scores) -> Table:
 
 def _percent(value: float | None) -> str:
     return "-" if value is None else f"{value:.1f} %"
-
-
-def _metres(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f} m"

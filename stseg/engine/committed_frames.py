@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles, ground_of
+from stseg.arrays import Flags, Ints, Labels, Rows, Singles, ground_of
 from stseg.geometry import Rig
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate
 from stseg.records.people import Explanation, People
@@ -145,7 +145,9 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(fused.frame, status, candidates))
             parts.append(candidates.view_evidence.T)
-    rates["residual"] = _finite_mean(np.array(residuals))
+    values, finite = np.array(residuals), np.isfinite(residuals)
+    mean = np.where(finite, values, 0).sum(0) / np.maximum(finite.sum(0), 1)
+    rates["residual"] = np.where(finite.any(0), mean, np.nan)
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.frames[0].frame
     commit = replace(commit, events=np.concatenate(events))
     return CommittedFrames(
@@ -171,12 +173,6 @@ def rate_rows(frame: int, estimate: ErrorRateEstimate) -> Rows:
 
 def _inside(frame: Ints, first: int, stop: int) -> Flags:
     return np.asarray((first <= frame) & (frame < stop))
-
-
-def _finite_mean(values: Floats) -> Floats:
-    """Mean over frames of the finite values (frame, view); nan for a view without any."""
-    finite = np.isfinite(values)
-    return np.where(finite.any(0), np.where(finite, values, 0).sum(0) / np.maximum(finite.sum(0), 1), np.nan)
 
 
 def _candidate_rows(frame: int, status: int, people: People) -> Rows:

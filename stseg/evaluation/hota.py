@@ -43,7 +43,8 @@ def _matches(sequence: Sequence, radius: float) -> tuple[Ints, Floats]:
         similar = similarity(frame.distance, radius)
         rows, columns = place = np.nonzero(similar)
         numbers.append(frame.person[rows] * sequence.tracks + frame.track[columns])
-        shares.append(_shares(similar)[place])
+        rivals = similar.sum(axis=0)[None] + similar.sum(axis=1)[:, None] - similar
+        shares.append(np.divide(similar, rivals, out=np.zeros_like(similar), where=rivals > _ROUNDING)[place])
     aligned = np.split(_alignment(sequence, numbers, shares), np.cumsum([len(number) for number in numbers])[:-1])
 
     pairs, similarities = list[Ints](), list[Floats]()
@@ -62,12 +63,6 @@ def _alignment(sequence: Sequence, numbers: list[Ints], shares: list[Floats]) ->
     pairs, index = np.unique(np.concatenate(numbers), return_inverse=True)
     agreed = np.bincount(index, np.concatenate(shares), minlength=len(pairs))
     return np.asarray((agreed / (_frames_of(pairs, sequence) - agreed))[index])
-
-
-def _shares(similar: Floats) -> Floats:
-    """Each similarity as a share of the sum over its person and its track in the frame, float64 (n, m)."""
-    rivals = similar.sum(axis=0)[None] + similar.sum(axis=1)[:, None] - similar
-    return np.asarray(np.divide(similar, rivals, out=np.zeros_like(similar), where=rivals > _ROUNDING))
 
 
 def _frames_of(pairs: Ints, sequence: Sequence) -> Ints:

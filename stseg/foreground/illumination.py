@@ -12,11 +12,16 @@ Then
    much more than in colour, are relit one by one: sharp borders of light, and saturated pixels. If these do not explain
    the change either, it was not light (an obstacle before the lens, a camera that was pushed), and the view is used
    again as it is.
+
+An empty scene may have other light than the recording. Where the first image shows so, the model is relit pixel by
+pixel, by the temporal mode of frames of the recording: people who walk are not in it.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
+from copy import deepcopy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -74,6 +79,24 @@ class IlluminationMonitor:
         self._good: Singles | None = None
         self._open: _OpenChange | None = None
 
+    def sees_other_light(self, image: Bytes) -> bool:
+        """Whether a first image, uint8 (v, u, 3) BGR, shows the scene in light other than that of the model."""
+        likelihood, config = deepcopy(self.model).likelihood(image), self._config
+        share, empty = self._share(likelihood), np.ones(likelihood.shape, np.float32)
+        if not _FAINT_SHARE * config.changed_share < share <= config.changed_share:
+            return share > config.changed_share
+        gain = gain_field(image, self.model.background_image(), empty)
+        return _is_broad(gain) and self._explains(gain, image, likelihood, empty)
+
+    def relight(self, images: Iterable[Bytes]) -> None:
+        """Relight the model, pixel by pixel, if images in which people walk, as of `learn_from`, are in other light."""
+        present = deepcopy(self.model)
+        present.learn_from(images)
+        scene = np.rint(present.background_image()).astype(np.uint8)
+        if self._share(deepcopy(self.model).likelihood(scene)) > _FAINT_SHARE * self._config.changed_share:
+            empty = np.ones(scene.shape[:2], np.float32)
+            self.model.relight(stationary_gain(scene[None], self.model.background_image(), empty, empty > 0))
+
     def skip(self) -> None:
         """Count a missing frame."""
         self._frames += 1
@@ -105,10 +128,6 @@ class IlluminationMonitor:
         """Share of the view with a likelihood above the prior."""
         return float((likelihood[::STRIDE, ::STRIDE] > np.float32(self.model.prior)).mean())
 
-    def _share_rise(self, likelihood: Singles) -> float:
-        """Rise of that share within the window."""
-        return self._share(likelihood) - min(self._shares)
-
     def _record_change(self) -> None:
         """Record a change, or one more step of the last."""
         if not self.changes or self._frames - self.changes[-1].last > self._window:
@@ -121,7 +140,7 @@ class IlluminationMonitor:
         if waited % max(1, self._patience // _KEPT_FRAMES) == 0:
             change.frames.append(image.copy())
         if waited < self._patience:
-            if self._share_rise(likelihood) <= config.changed_share:
+            if self._share(likelihood) - min(self._shares) <= config.changed_share:
                 return likelihood
             self._record_change()
             self.changes[-1].blind += 1
@@ -130,7 +149,7 @@ class IlluminationMonitor:
         gain = stationary_gain(
             np.stack([*change.frames, image]), self.model.background_image(), change.empty, unexplained
         )
-        if self._share_rise(likelihood) <= config.changed_share or self._explains(
+        if self._share(likelihood) - min(self._shares) <= config.changed_share or self._explains(
             gain, image, likelihood, change.empty
         ):
             self.model.relight(gain)

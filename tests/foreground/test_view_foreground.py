@@ -125,6 +125,26 @@ def test_people_stay_and_background_stays_background(model: Callable[..., Backgr
 
 
 @pytest.mark.parametrize("model", MODELS)
+def test_an_empty_scene_takes_the_light_of_the_recording(model: Callable[..., Background]) -> None:
+    watch, rng, light = watched(model), np.random.default_rng(2), np.where(U < 32, 1.8, 1.0)
+    images = [shot(light, body(frame), rng) for frame in range(0, 48, 4)]
+    assert watch.sees_other_light(images[0])
+    watch.relight(images)
+    found = watch.likelihood(shot(light, body(20), rng))
+    assert found is not None and (found[body(20)] > 0.5).mean() > 0.8 and (found[~body(20)] > 0.5).mean() < 0.04
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_walking_people_are_no_other_light(model: Callable[..., Background]) -> None:
+    watch, rng = watched(model), np.random.default_rng(2)
+    images = [shot(1.0, np.abs(U - 3 * frame) < 10, rng) for frame in range(24)]
+    before = watch.model.background_image()
+    assert watch.sees_other_light(images[4]) and not watch.sees_other_light(images[-1])
+    watch.relight(images)
+    np.testing.assert_array_equal(watch.model.background_image(), before)
+
+
+@pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("gain", [0.45, 1.7])
 def test_what_changes_all_of_a_view_alike_is_no_event(model: Callable[..., Background], gain: float) -> None:
     watch = watched(model)

@@ -8,6 +8,7 @@ paper's section 5.2.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,16 +48,11 @@ def _alone(
             leaf.follow(rng)
             views.append(leaf.settled(np.ones(config.particles), rng))
         else:
-            views.append(particles and _unseen(particles, motion))
+            views.append(particles and replace(particles, place=particles.place + motion.seconds * particles.velocity))
     seeing = [(leaf, view) for leaf, view in zip(leaves, views, strict=True) if leaf and view]
     visibility = np.array([float(leaf.visible_belief.sum()) if leaf else 0.0 for leaf in leaves])
     ground = _fused(seeing) if seeing else prediction.settled(prediction.centre, prediction.weight, rng)
     return Star(ground, tuple(views), visibility)
-
-
-def _unseen(particles: Particles, motion: Motion) -> Particles:
-    """Particles of a view that cannot show the target: moved at their velocities, as no message corrects them."""
-    return Particles(particles.place + motion.seconds * particles.velocity, particles.velocity, particles.weight)
 
 
 def _fused(seeing: Sequence[tuple[Leaf, Particles]]) -> Particles:

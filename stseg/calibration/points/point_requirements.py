@@ -19,7 +19,8 @@ def require_plane(name: str, ground: Floats, pixel: Floats) -> None:
         found, expected = f"{len(ground)} on the ground (z = 0)", f"at least {MIN_POINTS}, there or on another plane"
         raise CalibrationError(place, "points", found, expected)
     for where, points in (("on the ground", ground), ("in the image", pixel)):
-        if _on_line(points):
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if spread[1] <= _COLLINEAR_RATIO * spread[0]:
             raise CalibrationError(place, "points", f"points on one line {where}", "points spread over the ground")
         if all_but_one_on_line(points):
             found = f"points of which all but one lie on one line {where}"
@@ -47,8 +48,3 @@ def all_but_one_on_line(points: Floats) -> bool:
     scatter = product.sum(axis=0) - number / (number - 1) * product
     square = np.linalg.eigvalsh(scatter)
     return bool((square[:, -2] <= _COLLINEAR_RATIO**2 * square[:, -1]).any())
-
-
-def _on_line(points: Floats) -> bool:
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(spread[1] <= _COLLINEAR_RATIO * spread[0])

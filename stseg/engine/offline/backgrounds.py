@@ -7,6 +7,7 @@ segment.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from typing import TypeVar
 
 import numpy as np
@@ -47,7 +48,7 @@ def make_foregrounds(
 
     The background of a colour camera is trained on the background period of the segment; frames in which the camera is
     blind are replaced by the nearest in which it is not. A camera that is blind throughout keeps an untrained model,
-    which is never used. With an empty scene, the background is trained on that and updated by the period before.
+    which is never used. An empty scene teaches it instead, relit to the light of the recording, then the period before.
 
     Parameters
     ----------
@@ -134,17 +135,22 @@ def _view_foreground(
         return ViewForeground()
     frame_rate = recording.rig.frame_rate
     model = empty_background(recording, camera, config)
+    monitor = IlluminationMonitor(model, frame_rate, config.illumination)
     if recording.sources[camera].background is None:
-        covered = sampled(_covered_frames(recording, camera, training.part, streams), config.segments)
-        if len(covered):
+        if len(covered := sampled(_covered_frames(recording, camera, training.part, streams), config.segments)):
             model.learn_from(_images(recording, camera, covered, streams))
-    elif training.before:
-        frames = sampled(training.before, config.segments)
+        return ViewForeground(monitor)
+    frames = sampled(training.before or training.part, config.segments)
+    images = _images(recording, camera, frames, streams)
+    first = list(islice(images, 1))
+    if first and monitor.sees_other_light(first[0]):
+        monitor.relight(first := [*first, *images])
+    if training.before:
         learner = BackgroundLearner(model, frame_rate, frames.step, config.illumination)
-        for image in _images(recording, camera, frames, streams):
+        for image in chain(first, images):
             learner.update(image)
-        model = learner.learned()
-    return ViewForeground(IlluminationMonitor(model, frame_rate, config.illumination))
+        monitor = IlluminationMonitor(learner.learned(), frame_rate, config.illumination)
+    return ViewForeground(monitor)
 
 
 def _covered_frames(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:

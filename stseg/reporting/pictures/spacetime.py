@@ -138,19 +138,15 @@ def _draw_clock(canvas: Bytes, block: Block, frame_rate: float) -> None:
     pixels = block.pixel(np.column_stack([corners, np.full(4, first)]))
     left = corners[int(np.argmin(pixels[:, 0]))]
     stroke(canvas, block.pixel([[*left, first], [*left, last]]), mixed(INK, PAPER, 0.35), 2)
-    step = _nice((last - first) / frame_rate / 6)
+    least = (last - first) / frame_rate / 6  # the step is the next larger of 1, 2, 5 times a power of ten
+    power = 10.0 ** np.floor(np.log10(least))
+    step = float(power * min(k for k in (1, 2, 5, 10) if k * power >= least * (1 - 1e-9)))
     for second in np.arange(np.ceil(first / frame_rate / step) * step, last / frame_rate + 1e-9, step):
         frame = second * frame_rate
         outline(canvas, block.pixel(np.column_stack([corners, np.full(4, frame)])), mixed(RULE, PAPER, 0.4))
         u, v = block.pixel([*left, frame]).tolist()
         stroke(canvas, np.array([[u - 6, v], [u, v]]), INK)
         text(canvas, f"{second + 0.0:g} s", (u - 12, v), QUIET, 15, (1, 0.5))
-
-
-def _nice(value: float) -> float:
-    """The next larger of 1, 2, 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * min(k for k in (1, 2, 5, 10) if k * power >= value * (1 - 1e-9)))
 
 
 def _draw_threads(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
