@@ -44,7 +44,8 @@ class Network:
         self, path: Path, by_opencv: bool | None = None, sides: tuple[int, int] = _SIDES, most_pictures: int = 1
     ) -> None:
         self.path = path
-        data = _read(path)
+        with reading(path, _MODEL, SourceError):
+            data = read_bytes(path, limits.MODEL_FILE)
         try:
             self.header = parse_header(data)
             """Inputs, outputs and metadata in the file."""
@@ -129,11 +130,6 @@ def runtime(by_opencv: bool | None = None) -> str:
 
 def _by_opencv() -> bool:
     return find_spec("onnxruntime") is None
-
-
-def _read(path: Path) -> bytes:
-    with reading(path, _MODEL, SourceError):
-        return read_bytes(path, limits.MODEL_FILE)
 
 
 def _onnxruntime() -> Any:

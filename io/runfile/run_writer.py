@@ -75,7 +75,8 @@ class RunWriter:
 
         The numbers of frames, int64 (time,), rise.
         """
-        self._require_later(frames)
+        if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
+            raise ValueError(f"frames {frames} after frame {self._last_frame}")
         with self._disk.step():
             self._extend_packed("log_odds", log_odds)
             self._extend("frame", frames)
@@ -133,10 +134,6 @@ class RunWriter:
         file["ghosts"].attrs["views"] = cameras
         provenance = gather_provenance(self._recording, self._config_text)
         write_provenance(file.create_group(layout.PROVENANCE), provenance)
-
-    def _require_later(self, frames: Ints) -> None:
-        if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
-            raise ValueError(f"frames {frames} after frame {self._last_frame}")
 
     def _extend_packed(self, name: str, frames: Sequence[PackedFrame]) -> None:
         dataset = self._occupancy[name]

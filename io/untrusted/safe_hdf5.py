@@ -146,17 +146,12 @@ def require_sound_heaps(path: Path) -> None:
 def _collections(file: BinaryIO) -> Iterator[int]:
     """Places of all signatures; blocks overlap by what a signature may stand astride."""
     place = 0
-    while len(block := _block(file, place)) >= len(_SIGNATURE):
+    while file.seek(place) == place and len(block := file.read(_BLOCK)) >= len(_SIGNATURE):
         found = block.find(_SIGNATURE)
         while found >= 0:
             yield place + found
             found = block.find(_SIGNATURE, found + 1)
         place += len(block) - len(_SIGNATURE) + 1
-
-
-def _block(file: BinaryIO, place: int) -> bytes:
-    file.seek(place)
-    return file.read(_BLOCK)
 
 
 def _size_of_collection(file: BinaryIO, start: int) -> int:

@@ -1,31 +1,30 @@
 """Sudden illumination change: detection and recovery (docs/how-it-works.md, Foreground).
 
 A background model adapts to slow light, and by one gain a channel to whatever changes a whole view alike. Where a lamp
-or a cloud changes a part of the view, a large share of it turns into foreground at once: more than people can cover.
-Then
+or a cloud changes a part of the view, a large share of it turns into foreground at once: more than people can cover. In
+another light the new foreground keeps the texture of the background: dark spots stay darker than their surroundings. A
+body (somebody before the lens) has a texture of its own. If it is light,
 
-1. a smooth field of gains (`stseg.foreground.gain_field`) is fitted to the pixels that showed background just before.
-   If the field is broad, as no body is, and explains most of the new foreground, the model is relit by it. This is
-   tried from a quarter of such a share on, so that a moving cloud is followed step by step.
-2. Otherwise the view is blind until the change is explained, but not for longer than `blind_time`.
+1. a smooth field of gains (`stseg.foreground.gain_field`) is fitted to the pixels that showed background just before,
+   and the model is relit by it: from a quarter of such a share on, so that a moving cloud is followed step by step.
+2. As long as too much stays foreground, the view is blind, but not for longer than `blind_time`.
 3. After that time, pixels that showed background before the change, have been static since, and changed in brightness
-   much more than in colour, are relit one by one: sharp borders of light, and saturated pixels. If these do not explain
-   the change either, it was not light (an obstacle before the lens, a camera that was pushed), and the view is used
-   again as it is.
+   much more than in colour, are relit one by one: sharp borders of light, and saturated pixels.
 
-An empty scene may have other light than the recording. Where the first image shows so, the model is relit pixel by
-pixel, by the temporal mode of frames of the recording: people who walk are not in it.
+If it is no light (an obstacle before the lens, a camera that was pushed), the view is used again after that time as it
+is. What a background was learned from may have other light than the first image of a segment. The model is then relit
+by the temporal mode of the frames that share the light of that image: people who walk are not in it.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, minimum_filter
+from scipy.ndimage import gaussian_filter, minimum_filter, uniform_filter
 
 from stseg.arrays import Bytes, Flags, Singles
 from stseg.config import IlluminationConfig
@@ -34,12 +33,13 @@ from stseg.foreground.channel_gain import STRIDE
 from stseg.foreground.gain_field import gain_field
 
 _FAINT_SHARE = 0.25  # of the rise that is a change: from there on a smooth field is tried
-_FIELD_DEVIATION, _FIELD_SHARE = 0.03, 0.4  # a field is light if its logarithm differs from its median on this share
 _EQUAL_COLOUR = 20.0  # grey levels within which colours agree, in the channel that differs most
 _KEPT_FRAMES = 8  # frames since a change from which static pixels are found
 _STATIC_SHARE = 0.85  # share of them that must agree
 _GREATEST_TINT = 0.35  # of the logarithm of the gain: how much more one channel may change than their mean
 _GREATEST_GAIN = 1.5  # of that logarithm: how much one pixel's light may change
+_TEXTURE = 0.02  # of the logarithm of grey levels, against the surroundings: fainter texture is not compared
+_SAME_TEXTURE = 0.75  # share of it that stays in another light; of a body it is half, by chance
 _SURROUNDINGS = 0.02  # of the width of the view: how far the surroundings of a pixel reach
 
 
@@ -80,21 +80,24 @@ class IlluminationMonitor:
         self._open: _OpenChange | None = None
 
     def sees_other_light(self, image: Bytes) -> bool:
-        """Whether a first image, uint8 (v, u, 3) BGR, shows the scene in light other than that of the model."""
+        """Whether an image, uint8 (v, u, 3) BGR, shows another light than the model's, or more than people cover."""
         likelihood, config = deepcopy(self.model).likelihood(image), self._config
         share, empty = self._share(likelihood), np.ones(likelihood.shape, np.float32)
-        if not _FAINT_SHARE * config.changed_share < share <= config.changed_share:
-            return share > config.changed_share
-        gain = gain_field(image, self.model.background_image(), empty)
-        return _is_broad(gain) and self._explains(gain, image, likelihood, empty)
+        is_light = share > _FAINT_SHARE * config.changed_share and self._keeps_texture(image, likelihood, empty)
+        return share > config.changed_share or is_light
 
-    def relight(self, images: Iterable[Bytes]) -> None:
-        """Relight the model, pixel by pixel, if images in which people walk, as of `learn_from`, are in other light."""
+    def relight(self, images: Sequence[Bytes]) -> None:
+        """Relight the model, pixel by pixel, to the light of the first of images in which people walk.
+
+        Images uint8 (v, u, 3) BGR, as of `Background.learn_from`, teach that light until it changes.
+        """
+        lit = np.cumsum([2 * self.sees_other_light(image) - 1 for image in images])
+        ends = np.flatnonzero(np.maximum.accumulate(lit) - lit > 1)  # one frame may be wrong by itself
         present = deepcopy(self.model)
-        present.learn_from(images)
+        present.learn_from(images[: int(lit[: ends[0] if len(ends) else None].argmax()) + 1])
         scene = np.rint(present.background_image()).astype(np.uint8)
-        if self._share(deepcopy(self.model).likelihood(scene)) > _FAINT_SHARE * self._config.changed_share:
-            empty = np.ones(scene.shape[:2], np.float32)
+        likelihood, empty = deepcopy(self.model).likelihood(scene), np.ones(scene.shape[:2], np.float32)
+        if self._keeps_texture(scene, likelihood, empty):
             self.model.relight(stationary_gain(scene[None], self.model.background_image(), empty, empty > 0))
 
     def skip(self) -> None:
@@ -146,41 +149,30 @@ class IlluminationMonitor:
             self.changes[-1].blind += 1
             return None
         unexplained = likelihood > self.model.prior
-        gain = stationary_gain(
-            np.stack([*change.frames, image]), self.model.background_image(), change.empty, unexplained
-        )
-        if self._share(likelihood) - min(self._shares) <= config.changed_share or self._explains(
-            gain, image, likelihood, change.empty
-        ):
-            self.model.relight(gain)
+        is_few = self._share(likelihood) - min(self._shares) <= config.changed_share
+        if is_few or self._keeps_texture(image, likelihood, change.empty):
+            frames = np.stack([*change.frames, image])
+            self.model.relight(stationary_gain(frames, self.model.background_image(), change.empty, unexplained))
             likelihood = self.model.likelihood(image)
         self._open = None
         self._shares.clear()
         return likelihood
 
     def _in_new_light(self, image: Bytes, likelihood: Singles, empty: Singles) -> Singles:
-        """Likelihood after relighting the model by a smooth field of gains, if that explains the change."""
-        gain = gain_field(image, self.model.background_image(), empty)
-        if not _is_broad(gain) or not self._explains(gain, image, likelihood, empty):
+        """Likelihood after relighting the model by a smooth field of gains, if the change is one of light."""
+        if not self._keeps_texture(image, likelihood, empty):
             return likelihood
         self._record_change()
-        self.model.relight(gain)
+        self.model.relight(gain_field(image, self.model.background_image(), empty))
         return self.model.likelihood(image)
 
-    def _explains(self, gain: Singles, image: Bytes, likelihood: Singles, empty: Singles) -> bool:
-        """Whether gains explain most of the new foreground."""
-        few = np.s_[::STRIDE, ::STRIDE]
-        expected = np.minimum(gain[few] * self.model.background_image()[few], 255)
-        agrees = np.abs(image[few] - expected).max(-1) <= _EQUAL_COLOUR
-        new = (likelihood[few] > self.model.prior) & (empty[few] > 0.5)
-        return bool(2 * np.count_nonzero(new & agrees) > np.count_nonzero(new))
-
-
-def _is_broad(gain: Singles) -> bool:
-    """Whether a field differs over much of the view; a field that differs locally follows a body."""
-    logarithm = np.log(gain[::STRIDE, ::STRIDE])
-    differs = np.abs(logarithm - np.median(logarithm, axis=(0, 1))).max(-1) > _FIELD_DEVIATION
-    return bool(differs.mean() > _FIELD_SHARE)
+    def _keeps_texture(self, image: Bytes, likelihood: Singles, empty: Singles) -> bool:
+        """Whether new foreground has the texture of the background, as another light has; a body has its own."""
+        around = max(6, round(_SURROUNDINGS * image.shape[1]))
+        grey = (np.log(colours.mean(-1, dtype=np.float32) + 1) for colours in (image, self.model.background_image()))
+        now, before = (uniform_filter(level, around // 6) - uniform_filter(level, 2 * around) for level in grey)
+        new = (likelihood > self.model.prior) & (empty > 0.5) & (np.abs(before) > _TEXTURE)
+        return bool(np.count_nonzero(new & (now * before > 0)) > _SAME_TEXTURE * np.count_nonzero(new))
 
 
 @dataclass(slots=True)

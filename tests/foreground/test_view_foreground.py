@@ -125,13 +125,29 @@ def test_people_stay_and_background_stays_background(model: Callable[..., Backgr
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_an_empty_scene_takes_the_light_of_the_recording(model: Callable[..., Background]) -> None:
+@pytest.mark.parametrize("until", [48, 20])
+def test_a_background_takes_the_first_light_of_a_segment(model: Callable[..., Background], until: int) -> None:
     watch, rng, light = watched(model), np.random.default_rng(2), np.where(U < 32, 1.8, 1.0)
-    images = [shot(light, body(frame), rng) for frame in range(0, 48, 4)]
+    images = [shot(light if frame < until else 1.0, body(frame), rng) for frame in range(0, 48, 4)]
     assert watch.sees_other_light(images[0])
     watch.relight(images)
+    np.testing.assert_allclose(np.median(watch.model.background_image() / scene(), (0, 2)), light[0], rtol=0.1)
     found = watch.likelihood(shot(light, body(20), rng))
     assert found is not None and (found[body(20)] > 0.5).mean() > 0.8 and (found[~body(20)] > 0.5).mean() < 0.04
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_grey_body_before_the_lens_is_no_light(model: Callable[..., Background]) -> None:
+    watch, rng = watched(model), np.random.default_rng(2)
+    nobody, near = np.zeros(SIZE[::-1], bool), (U > 12) & (U < 52) & (V > 4)
+    images = [shot(1.0, nobody, rng) for _ in range(EVENT + 24)]
+    for image in images[EVENT:]:
+        image[near] = shot(2.0, nobody, rng)[::-1, ::-1][near]  # another texture in the room's colours
+    before = watch.model.background_image()
+    watch.relight(images[EVENT:])
+    np.testing.assert_array_equal(watch.model.background_image(), before)
+    found = [watch.likelihood(image) for image in images][-1]
+    assert found is not None and (found[near] > 0.5).mean() > 0.8 and (found[~near] > 0.5).mean() < 0.04
 
 
 @pytest.mark.parametrize("model", MODELS)

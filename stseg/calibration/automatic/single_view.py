@@ -46,9 +46,10 @@ def view_of_upright(endpoints: Endpoints, size: tuple[int, int], person_height: 
 
     def fit(rows: Endpoints, start: Floats, most: int) -> tuple[float, Floats]:
         def residual(unknown: Floats) -> Floats:
-            return np.concatenate(
-                [_head_residuals(_view(unknown), rows, size, person_height) / _SPREAD, _prior(unknown)]
-            )
+            focal, _, roll, height, k1 = unknown
+            # Field of view of 40 to 90 degrees, upright, a few metres high.
+            prior = [(focal - np.log(0.9)) / 0.4, roll / 0.1, (height - np.log(3.0)) / 0.7, (k1 + 0.15) / 0.2]
+            return np.append(_head_residuals(_view(unknown), rows, size, person_height) / _SPREAD, prior)
 
         found = least_squares(residual, start, loss="cauchy", max_nfev=most)
         return float(found.cost), np.asarray(found.x)
@@ -67,12 +68,6 @@ def _view(unknown: Floats) -> Floats:
     view = np.zeros(SIZE)
     view[FOCAL], view[TURN], view[CENTRE], view[RADIAL] = focal, looking(pitch, roll), (0, 0, np.exp(height)), (k1, 0)
     return view
-
-
-def _prior(unknown: Floats) -> Floats:
-    """Prior residuals: field of view of 40 to 90 degrees, upright, a few metres high."""
-    focal, _, roll, height, k1 = unknown
-    return np.array([(focal - np.log(0.9)) / 0.4, roll / 0.1, (height - np.log(3.0)) / 0.7, (k1 + 0.15) / 0.2])
 
 
 def _head_residuals(view: Floats, endpoints: Endpoints, size: tuple[int, int], person_height: float) -> Floats:

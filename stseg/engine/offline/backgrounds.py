@@ -7,7 +7,7 @@ segment.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import islice
 from typing import TypeVar
 
 import numpy as np
@@ -48,7 +48,7 @@ def make_foregrounds(
 
     The background of a colour camera is trained on the background period of the segment; frames in which the camera is
     blind are replaced by the nearest in which it is not. A camera that is blind throughout keeps an untrained model,
-    which is never used. An empty scene teaches it instead, relit to the light of the recording, then the period before.
+    which is never used. An empty scene teaches it instead, then the period before. At last each takes the first light.
 
     Parameters
     ----------
@@ -68,7 +68,29 @@ def make_foregrounds(
     """
     segment = Segment(0, first, first, stop) if segment is None else segment
     training = background_frames(segment, config.segments, recording.rig.frame_rate, first, stop)
+    learned = learn_foregrounds(recording, config, training, streams)
+    take_first_light(learned, recording, config, segment, streams)
+    return learned
+
+
+def learn_foregrounds(
+    recording: Recording, config: Config, training: BackgroundFrames, streams: StreamIndex | None
+) -> list[ViewForeground]:
+    """Foreground models of all cameras in the light of their training frames; see `make_foregrounds`."""
     return [_view_foreground(recording, k, config, training, streams) for k in range(len(recording.sources))]
+
+
+def take_first_light(
+    learned: list[ViewForeground], recording: Recording, config: Config, segment: Segment, streams: StreamIndex | None
+) -> None:
+    """Relight the backgrounds of all cameras whose first image of a segment is in other light."""
+    frames = sampled(range(segment.lead, segment.stop), config.segments)
+    for camera, foreground in enumerate(learned):
+        if foreground.background is not None:
+            images = _images(recording, camera, frames, streams)
+            first = list(islice(images, 1))
+            if first and foreground.background.sees_other_light(first[0]):
+                foreground.background.relight([*first, *images])
 
 
 def background_frames(
@@ -135,22 +157,17 @@ def _view_foreground(
         return ViewForeground()
     frame_rate = recording.rig.frame_rate
     model = empty_background(recording, camera, config)
-    monitor = IlluminationMonitor(model, frame_rate, config.illumination)
     if recording.sources[camera].background is None:
-        if len(covered := sampled(_covered_frames(recording, camera, training.part, streams), config.segments)):
+        covered = sampled(_covered_frames(recording, camera, training.part, streams), config.segments)
+        if len(covered):
             model.learn_from(_images(recording, camera, covered, streams))
-        return ViewForeground(monitor)
-    frames = sampled(training.before or training.part, config.segments)
-    images = _images(recording, camera, frames, streams)
-    first = list(islice(images, 1))
-    if first and monitor.sees_other_light(first[0]):
-        monitor.relight(first := [*first, *images])
-    if training.before:
+    elif training.before:
+        frames = sampled(training.before, config.segments)
         learner = BackgroundLearner(model, frame_rate, frames.step, config.illumination)
-        for image in chain(first, images):
+        for image in _images(recording, camera, frames, streams):
             learner.update(image)
-        monitor = IlluminationMonitor(learner.learned(), frame_rate, config.illumination)
-    return ViewForeground(monitor)
+        model = learner.learned()
+    return ViewForeground(IlluminationMonitor(model, frame_rate, config.illumination))
 
 
 def _covered_frames(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:

@@ -6,7 +6,12 @@ from contextlib import ExitStack
 from copy import deepcopy
 from pathlib import Path
 
-from stseg.engine.offline.backgrounds import BackgroundFrames, background_frames, make_foregrounds
+from stseg.engine.offline.backgrounds import (
+    BackgroundFrames,
+    background_frames,
+    learn_foregrounds,
+    take_first_light,
+)
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
@@ -62,6 +67,8 @@ class SegmentWorker:
         job = self.job
         frames = background_frames(segment, job.config.segments, job.recording.rig.frame_rate, job.first, job.stop)
         if frames != self._learned_from:
-            self._learned = make_foregrounds(job.read, job.config, job.first, job.stop, segment, job.streams)
+            self._learned = learn_foregrounds(job.read, job.config, frames, job.streams)
             self._learned_from = frames
-        return deepcopy(self._learned)
+        foregrounds = deepcopy(self._learned)
+        take_first_light(foregrounds, job.read, job.config, segment, job.streams)
+        return foregrounds
