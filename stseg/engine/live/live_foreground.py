@@ -1,7 +1,8 @@
 """Causal background models: foreground of each camera of a recording in progress, learned from past frames only.
 
 A camera with an empty scene uses the same background as in a run over the whole recording
-(`stseg.engine.offline.backgrounds`). A camera without one learns from the first frames received, and is then updated.
+(`stseg.engine.offline.backgrounds`), in the light of that scene: the frames that show another light are still to come.
+A camera without one learns from the first frames received, and is then updated.
 """
 
 from collections.abc import Iterable

@@ -6,12 +6,7 @@ from contextlib import ExitStack
 from copy import deepcopy
 from pathlib import Path
 
-from stseg.engine.offline.backgrounds import (
-    BackgroundFrames,
-    background_frames,
-    learn_foregrounds,
-    take_first_light,
-)
+from stseg.engine.offline.backgrounds import BackgroundFrames, background_frames, learn_foregrounds, take_first_light
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
