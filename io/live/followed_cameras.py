@@ -159,18 +159,13 @@ class FollowedCameras(AbstractContextManager["FollowedCameras"], Iterator[FrameS
         """Wait for the cameras' observations at these times; None where the run is stopped."""
         with self._arrival:
             while True:
-                rest = max(at) + self._stale - now()
-                if rest <= 0 or all(
-                    self._has_passed(stream, time) for stream, time in zip(self._streams, at, strict=True)
-                ):
-                    return tuple(self._nearest(stream, time) for stream, time in zip(self._streams, at, strict=True))
+                rest, streams = max(at) + self._stale - now(), list(zip(self._streams, at, strict=True))
+                has_passed = (stream.pictures and stream.pictures[-1].at >= time for stream, time in streams)
+                if rest <= 0 or all(has_passed):  # later pictures cannot be nearer to the times
+                    return tuple(self._nearest(stream, time) for stream, time in streams)
                 if self._stopped():
                     return None
                 self._arrival.wait(min(rest, STOP_INTERVAL))
-
-    def _has_passed(self, stream: LiveStream, time: float) -> bool:
-        """Whether later pictures cannot be nearer to the time."""
-        return bool(stream.pictures) and stream.pictures[-1].at >= time
 
     def _nearest(self, stream: LiveStream, time: float) -> Observation:
         """A camera's picture at a time; None where none arrived near it."""

@@ -22,7 +22,7 @@ from scenes import walkers
 
 import stseg.engine.live.following
 from stseg import evaluate, read_run, read_tracks_csv
-from stseg.arrays import Rows
+from stseg.arrays import Bytes, Rows
 from stseg.engine.live.following import last_frame
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
@@ -207,10 +207,33 @@ def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: Capture
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)
     assert track(rig, output, "--follow", "--frames", f":{FRAMES}", "--set", "live.background_time=5") == 0
-    assert "no empty scene of west, east, north: learning from 5 s before the run begins" in capsys.readouterr().err
+    said = "no empty scene of west, east, north in this light: learning from 5 s before the run begins"
+    assert said in capsys.readouterr().err
     run = read_run(output)
     assert run.frames.tolist() == list(range(FRAMES))
     assert evaluate(walkers(FRAMES), run.trajectory).misses < 0.1 * 3 * FRAMES
+
+
+def _tiled_wall(size: tuple[int, int]) -> Bytes:
+    v, u = np.indices(size[::-1]) / 2
+    return np.repeat((170 + 20 * np.sin(u) * np.cos(v)).astype(np.uint8)[..., None], 3, -1)
+
+
+def test_an_empty_scene_takes_the_light_of_now(
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("arrivals.empty_scene", _tiled_wall)
+    rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
+    for camera in filmed_rig().cameras:
+        dim = _tiled_wall(camera.size)
+        dim[:, : camera.size[0] // 2] //= 2
+        write_at_rate(tmp_path / f"{camera.name}_empty.avi", [dim] * 4)
+    arrive(tmp_path, 1, 2, 3, 4)
+    more = ("--set", "live.background_time=5", "--set", "segments.background_samples=20")
+    assert track(rig, output, "--follow", "--frames", f":{FRAMES}", *more) == 0
+    assert "no empty scene of west, east, north in this light: learning" in capsys.readouterr().err
+    scores = evaluate(walkers(FRAMES), read_run(output).trajectory)
+    assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
 
 
 @pytest.fixture(scope="module")

@@ -202,9 +202,9 @@ def _files(
     before = background_frames(coming, config.segments, frame_rate, 0, ENDLESS).before
     first = before.start if foregrounds.has_backgrounds else coming.lead
     notes = FileNotes(folder.path / "files.json")
-    if foregrounds.untrained:
+    if foregrounds.has_backgrounds:
         with FollowedFiles(recording, first, None, config.live, notes, halt, reporter.note) as frame_sets:
-            if not _learn(foregrounds, frame_sets, config.live.background_time, reporter):
+            if _taught(foregrounds, iter(frame_sets), config.live.background_time, reporter) is None:
                 yield None
                 return
     stop = None if job.stop == ENDLESS else job.stop
@@ -219,10 +219,8 @@ def _cameras(
     """Frame sets of live streams from now on; None if stopped before any frame arrived."""
     recording, config, foregrounds = job.read, job.config, follower.foregrounds
     with FollowedCameras(recording, config.live, folder.clock(), halt, reporter.note) as frame_sets:
-        if foregrounds.untrained and not _learn(foregrounds, frame_sets, config.live.background_time, reporter):
-            yield None
-            return
-        begun = next(frame_sets, None)
+        taught = _taught(foregrounds, frame_sets, config.live.background_time, reporter)
+        begun = None if taught is None else next(taught, None)
         if begun is None or frame_sets.start is None:
             yield None
             return
@@ -235,15 +233,20 @@ def _cameras(
             reporter.note(f"{frame_sets.dropped} frame sets were dropped in all: see /events")
 
 
-def _learn(foregrounds: LiveForegrounds, frame_sets: Iterable[FrameSet], seconds: float, reporter: Reporter) -> bool:
-    """Teach the cameras that have no empty scene; False where the run is stopped before anything came."""
-    reporter.note(
-        f"no empty scene of {', '.join(foregrounds.untrained)}: learning from {seconds:g} s before the run begins"
-    )
+def _taught(
+    foregrounds: LiveForegrounds, frame_sets: Iterator[FrameSet], seconds: float, reporter: Reporter
+) -> Iterator[FrameSet] | None:
+    """Teach the cameras without an empty scene in the light of now; the frame sets after, None if there came none."""
+    first = next(frame_sets, None)
+    if first is None:
+        return None
+    foregrounds.see_first_light(first)
+    frame_sets, names = chain([first], frame_sets), ", ".join(foregrounds.untrained)
+    if not names:
+        return frame_sets
+    reporter.note(f"no empty scene of {names} in this light: learning from {seconds:g} s before the run begins")
     count = foregrounds.learn(frame_sets)
-    if count and foregrounds.untrained:
-        found = f"nothing in the first {count} frames"
-        raise SourceError(
-            f"camera {foregrounds.untrained[0]}", "", found, "a camera that shows something, or its empty scene"
-        )
-    return count > 0
+    if foregrounds.untrained:
+        camera, found = f"camera {foregrounds.untrained[0]}", f"nothing in the first {count} frames"
+        raise SourceError(camera, "", found, "a camera that shows something, or its empty scene")
+    return frame_sets

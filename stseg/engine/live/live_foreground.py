@@ -1,18 +1,20 @@
 """Causal background models: foreground of each camera of a recording in progress, learned from past frames only.
 
 A camera with an empty scene uses the same background as in a run over the whole recording
-(`stseg.engine.offline.backgrounds`), in the light of that scene: the frames that show another light are still to come.
-A camera without one learns from the first frames received, and is then updated.
+(`stseg.engine.offline.backgrounds`). A camera without one learns from the first frames received, and is then updated;
+one with an empty scene in other light is relit by them.
 """
 
 from collections.abc import Iterable
 from copy import deepcopy
+from itertools import islice
 
 import numpy as np
 
 from stseg.arrays import Bytes, Observation
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import BackgroundLearner, empty_background, is_colour, part_length, sampled
+from stseg.foreground.background.model import Background
 from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import FrameSet
@@ -40,11 +42,17 @@ class LiveForegrounds:
 
     @property
     def untrained(self) -> list[str]:
-        """Names of the cameras whose background is not trained yet."""
+        """Names of the cameras whose background is not trained yet, or in other light than the first frame set."""
         return [self._recording.rig.cameras[k].name for k in sorted(self._untrained)]
 
+    def see_first_light(self, frame_set: FrameSet) -> None:
+        """Note the cameras with an empty scene that is in other light than the first frame set."""
+        for k, model in self._empty.items():
+            if any(self._monitor(model).sees_other_light(image) for image in _image(frame_set.views[k])):
+                self._untrained.add(k)
+
     def learn(self, frame_sets: Iterable[FrameSet]) -> int:
-        """Train the backgrounds of the cameras without an empty scene; returns the number of frame sets consumed.
+        """Train or relight the backgrounds of untrained cameras; returns the number of frame sets consumed.
 
         These are the first ones, of which at most `live.background_time` seconds are consumed.
         """
@@ -52,15 +60,14 @@ class LiveForegrounds:
         step = sampled(range(frames), self._config.segments).step
         samples: dict[int, list[Bytes]] = {k: [] for k in self._untrained}
         count = 0
-        for count, frame_set in enumerate(frame_sets, 1):
+        for count, frame_set in enumerate(islice(frame_sets, frames), 1):
             if (count - 1) % step == 0:
                 for k, images in samples.items():
                     images += _image(frame_set.views[k])
-            if count == frames:
-                break
         for k, images in samples.items():
             if images:
-                self._models[k].learn_from(images)
+                model = self._models[k]
+                (self._monitor(model).relight if k in self._empty else model.learn_from)(images)
                 self._untrained.discard(k)
         return count
 
@@ -79,12 +86,13 @@ class LiveForegrounds:
 
     def snapshot(self) -> list[ViewForeground]:
         """Foreground models for a segment whose warm-up begins now: copies of the current backgrounds."""
-        frame_rate, illumination = self._recording.rig.frame_rate, self._config.illumination
-        models = [self._models.get(k) for k in range(len(self._recording.sources))]
         return [
-            ViewForeground(None if model is None else IlluminationMonitor(deepcopy(model), frame_rate, illumination))
-            for model in models
+            ViewForeground(self._monitor(deepcopy(self._models[k])) if k in self._models else None)
+            for k in range(len(self._recording.sources))
         ]
+
+    def _monitor(self, model: Background) -> IlluminationMonitor:
+        return IlluminationMonitor(model, self._recording.rig.frame_rate, self._config.illumination)
 
     def _begin_part(self) -> None:
         """Begin a background period: use the model of the last one, and restart learning from an empty scene."""

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from stseg.arrays import Bytes, Floats
+from stseg.arrays import Bytes
 
 Colour = tuple[int, int, int]
 """Blue, green, red, 0..255: OpenCV's order."""
@@ -48,7 +48,8 @@ def track_colour(identity: int) -> Colour:
         linear = np.asarray(_RGB_OF_LMS @ (_LMS_OF_OKLAB @ oklab) ** 3)
         if linear.min() >= 0 and linear.max() <= 1:  # the screen can show it
             break
-    red, green, blue = np.rint(255 * _gamma(linear)).astype(int).tolist()
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.clip(linear, 0, None) ** (1 / 2.4) - 0.055)
+    red, green, blue = np.rint(255 * srgb).astype(int).tolist()
     return blue, green, red
 
 
@@ -67,8 +68,3 @@ def mixed(colour: Colour, other: Colour, share: float) -> Colour:
     """`colour` with a share 0..1 of `other`."""
     blue, green, red = (round(a + (b - a) * share) for a, b in zip(colour, other, strict=True))
     return blue, green, red
-
-
-def _gamma(linear: Floats) -> Floats:
-    """The transfer function of sRGB."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.clip(linear, 0, None) ** (1 / 2.4) - 0.055)
