@@ -88,7 +88,7 @@ class LiveConfig(Settings):
     file_quiet_time: float = positive(10.0)
     """Time without new data after which the newest file counts as complete, seconds."""
     background_time: float = positive(60.0)
-    """Time for which a live camera without an empty scene in this light is observed before the run begins, seconds."""
+    """Time for which a live camera without an empty scene that fits is observed before the run begins, seconds."""
     frame_tolerance: float = positive(0.3)
     """Largest time difference at which a live image stands for a frame, seconds; at least 3/4 of a frame."""
     stream_timeout: float = positive(5.0)

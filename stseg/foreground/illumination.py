@@ -41,7 +41,7 @@ _GREATEST_GAIN = 1.5  # of that logarithm: how much one pixel's light may change
 _TEXTURE = 0.02  # of the logarithm of grey levels, against the surroundings: fainter texture is not compared
 _SAME_TEXTURE = 0.75  # share of it that stays in another light; of a body it is half, by chance
 _SURROUNDINGS = 0.02  # of the width of the view: how far the surroundings of a pixel reach
-_FEWEST = 36.0  # surroundings with texture by which light is known: three quarters agree by chance once in 500
+_FEWEST_SURROUNDINGS = 36.0  # with texture, by which light is known: three quarters agree by chance once in 500
 
 
 @dataclass(slots=True)
@@ -173,7 +173,7 @@ class IlluminationMonitor:
         grey = (np.log(colours.mean(-1, dtype=np.float32) + 1) for colours in (image, self.model.background_image()))
         now, before = (uniform_filter(level, around // 6) - uniform_filter(level, 2 * around) for level in grey)
         new = (likelihood > self.model.prior) & (empty > 0.5) & (np.abs(before) > _TEXTURE)
-        compared = max(_FEWEST * around**2, np.count_nonzero(new))
+        compared = max(_FEWEST_SURROUNDINGS * around**2, np.count_nonzero(new))
         return bool(np.count_nonzero(new & (now * before > 0)) > _SAME_TEXTURE * compared)
 
 

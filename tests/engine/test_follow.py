@@ -207,7 +207,7 @@ def test_without_an_empty_scene_no_frame_is_lost(tmp_path: Path, capsys: Capture
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)
     assert track(rig, output, "--follow", "--frames", f":{FRAMES}", "--set", "live.background_time=5") == 0
-    said = "no empty scene of west, east, north in this light: learning from 5 s before the run begins"
+    said = "no empty scene that fits west, east, north: learning from 5 s before the run begins"
     assert said in capsys.readouterr().err
     run = read_run(output)
     assert run.frames.tolist() == list(range(FRAMES))
@@ -231,7 +231,7 @@ def test_an_empty_scene_takes_the_light_of_now(
     arrive(tmp_path, 1, 2, 3, 4)
     more = ("--set", "live.background_time=5", "--set", "segments.background_samples=20")
     assert track(rig, output, "--follow", "--frames", f":{FRAMES}", *more) == 0
-    assert "no empty scene of west, east, north in this light: learning" in capsys.readouterr().err
+    assert "no empty scene that fits west, east, north: learning" in capsys.readouterr().err
     scores = evaluate(walkers(FRAMES), read_run(output).trajectory)
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
 

@@ -236,7 +236,7 @@ def _cameras(
 def _taught(
     foregrounds: LiveForegrounds, frame_sets: Iterator[FrameSet], seconds: float, reporter: Reporter
 ) -> Iterator[FrameSet] | None:
-    """Teach the cameras without an empty scene in the light of now; the frame sets after, None if there came none."""
+    """Teach the cameras without an empty scene that fits; the frame sets that follow, None if none came."""
     first = next(frame_sets, None)
     if first is None:
         return None
@@ -244,7 +244,7 @@ def _taught(
     frame_sets, names = chain([first], frame_sets), ", ".join(foregrounds.untrained)
     if not names:
         return frame_sets
-    reporter.note(f"no empty scene of {names} in this light: learning from {seconds:g} s before the run begins")
+    reporter.note(f"no empty scene that fits {names}: learning from {seconds:g} s before the run begins")
     count = foregrounds.learn(frame_sets)
     if foregrounds.untrained:
         camera, found = f"camera {foregrounds.untrained[0]}", f"nothing in the first {count} frames"

@@ -42,11 +42,11 @@ class LiveForegrounds:
 
     @property
     def untrained(self) -> list[str]:
-        """Names of the cameras whose background is not trained yet, or in other light than the first frame set."""
+        """Names of the cameras whose background is not trained yet, or does not fit the first frame set."""
         return [self._recording.rig.cameras[k].name for k in sorted(self._untrained)]
 
     def see_first_light(self, frame_set: FrameSet) -> None:
-        """Note the cameras with an empty scene that is in other light than the first frame set."""
+        """Note the cameras whose empty scene does not fit the first frame set: its light, or more than people cover."""
         for k, model in self._empty.items():
             if any(self._monitor(model).sees_other_light(image) for image in _image(frame_set.views[k])):
                 self._untrained.add(k)
